@@ -7,6 +7,7 @@
 #include <filesystem>
 #include <memory>
 #include <opencv2/imgcodecs.hpp>
+#include <sstream>
 #include <string>
 #include <vector>
 
@@ -20,16 +21,18 @@
 // camera poses and of the scale are part of it. Counters:
 //   keyframes, depth_s_per_keyframe, mesh_s   size of the map, time of the depth and of the mesh
 //   complete, accurate      share of the pixels that two keyframes see whose depth is within 2 % of the
-//   truth; the same of
-//                           those that have a depth
+//                           truth; the same of those that have a depth
+//   mesh_complete_2, mesh_accurate_2 and so on
+//                           the same two shares of the mesh as the keyframes see it, for each of
+//                           kDepthTolerances in percent
 //   triangles, mesh_kB      of the mesh as it is stored
 //   hidden, wrongly_hidden  share of the content pixels behind a surface that are hidden; of those before it
 //   edge_px                 median distance of the edges of objects in the drawn image from the true ones
 //   flicker                 share of the content pixels that change from hidden to shown, or back, from one
 //                           frame to the next without cause
 // DOCENT_BENCH_SCENE (default room), DOCENT_BENCH_SEED (default 1) and DOCENT_BENCH_SECONDS (default 12)
-// choose the scene, its seed and the duration. With DOCENT_BENCH_IMAGES, the drawn images are written to that
-// folder.
+// choose the scene, its seed and the duration. SurfaceDepth measures the mesh's depth only. With
+// DOCENT_BENCH_IMAGES, the drawn images are written to that folder.
 //
 //   docent_bench --benchmark_filter=DenseSurfaces
 namespace docent::bench {
@@ -101,14 +104,38 @@ app::OcclusionFigures MeasureHiding(const BuiltMap& built, const engine::Surface
   return figures;
 }
 
-void DenseSurfaces(benchmark::State& state) {
+BuiltMap BuildChosen() {
   const char* const scene = std::getenv("DOCENT_BENCH_SCENE");
   const char* const seed = std::getenv("DOCENT_BENCH_SEED");
   const char* const seconds = std::getenv("DOCENT_BENCH_SECONDS");
+  return Build(scene != nullptr ? scene : "room", seed != nullptr ? std::strtoull(seed, nullptr, 10) : 1,
+               seconds != nullptr ? std::atof(seconds) : 12);
+}
+
+void AddMeshDepth(const BuiltMap& built, const engine::SurfaceMesh& mesh, benchmark::State* state) {
+  const app::DepthFigures figures =
+      app::MeasureMesh(*built.simulation, built.map, mesh, 1, built.keyframes, built.world_from_map);
+  for (std::size_t i = 0; i < app::kDepthTolerances.size(); ++i) {
+    std::ostringstream percent;
+    percent << 100 * app::kDepthTolerances[i];
+    state->counters["mesh_complete_" + percent.str()] = figures.Completeness(i);
+    state->counters["mesh_accurate_" + percent.str()] = figures.Accuracy(i);
+  }
+}
+
+void SurfaceDepth(benchmark::State& state) {
   for (auto _ : state) {
-    const BuiltMap built =
-        Build(scene != nullptr ? scene : "room", seed != nullptr ? std::strtoull(seed, nullptr, 10) : 1,
-              seconds != nullptr ? std::atof(seconds) : 12);
+    const BuiltMap built = BuildChosen();
+    const auto mesh = engine::DensifyMap(built.map);
+    state.counters["keyframes"] = static_cast<double>(built.map->keyframes.size());
+    AddMeshDepth(built, mesh->mesh, &state);
+  }
+}
+BENCHMARK(SurfaceDepth)->Unit(benchmark::kSecond)->Iterations(1);
+
+void DenseSurfaces(benchmark::State& state) {
+  for (auto _ : state) {
+    const BuiltMap built = BuildChosen();
     const app::DepthFigures depth =
         app::MeasureDepthMaps(*built.simulation, built.map, built.keyframes, built.world_from_map);
     const auto start = Clock::now();
@@ -125,6 +152,7 @@ void DenseSurfaces(benchmark::State& state) {
     state.counters["mesh_s"] = mesh_s;
     state.counters["complete"] = depth.Completeness();
     state.counters["accurate"] = depth.Accuracy();
+    AddMeshDepth(built, mesh->mesh, &state);
     state.counters["triangles"] = static_cast<double>(mesh->mesh.triangles.size());
     state.counters["mesh_kB"] = static_cast<double>(maps::MeshBytes(*mesh)) / 1000;
     state.counters["hidden"] = hiding.HiddenShare();

@@ -45,6 +45,9 @@ TEST_F(SurfaceAccuracy, SurfacesHideTheContentBehindThemAndNoOther) {
   ui::Renderer renderer;
   const auto mesh = engine::DensifyMap(map_);
   ASSERT_TRUE(mesh);
+  const DepthFigures depth = MeasureMesh(*simulation_, map_, mesh->mesh, 3, frames_, {});
+  EXPECT_GT(depth.Completeness(), 0.93) << "measured: 0.957";
+  EXPECT_GT(depth.Accuracy(), 0.95) << "measured: 0.969";
   const auto surfaces = std::make_shared<const engine::SurfaceMesh>(mesh->mesh);
   OcclusionFigures figures, without;
   for (std::size_t i = 0; i + 1 < frames_.size(); i += 2) {

@@ -1,14 +1,18 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "tests/app/support/surface_accuracy.h"
 
+#include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
 #include <limits>
 #include <map>
 #include <opencv2/imgproc.hpp>
+#include <optional>
 #include <utility>
 
 #include "content/scene.h"
+#include "engine/dense/depth_estimation.h"
+#include "engine/vision/image_pyramid.h"
 
 namespace docent::app {
 namespace {
@@ -22,22 +26,118 @@ int CountSeeing(const Simulation& simulation, const std::vector<int>& frames, co
   return seeing;
 }
 
-void AddDepthMap(const Simulation& simulation, const engine::DepthMap& depth, int frame,
-                 const std::vector<int>& others, double metres_per_unit, DepthFigures* figures) {
+// inverse_distance: of the surfaces that the keyframe sees in the pixels of a pyramid level, 1 / map units; 0
+// where it is not known.
+void AddDepths(const Simulation& simulation, const cv::Mat& inverse_distance, int level, int frame,
+               const std::vector<int>& others, double metres_per_unit, DepthFigures* figures) {
   const engine::Rigid3 world_from_camera = simulation.world_from_camera(frame);
-  for (int y = 0; y < depth.inverse_distance.rows; ++y) {
-    for (int x = 0; x < depth.inverse_distance.cols; ++x) {
+  for (int y = 0; y < inverse_distance.rows; ++y) {
+    for (int x = 0; x < inverse_distance.cols; ++x) {
       const auto surface =
-          simulation.SurfaceAlong(world_from_camera, engine::LevelZeroFromLevel({x, y}, depth.rays->level()));
+          simulation.SurfaceAlong(world_from_camera, engine::LevelZeroFromLevel({x, y}, level));
       if (!surface || CountSeeing(simulation, others, *surface, 1) == 0) continue;
       ++figures->seen;
-      const double inverse = depth.inverse_distance.at<float>(y, x);
+      const double inverse = inverse_distance.at<float>(y, x);
       if (inverse <= 0) continue;
       ++figures->known;
       const double truth_m = (*surface - world_from_camera.translation).norm();
-      figures->correct += std::abs(metres_per_unit / inverse / truth_m - 1) < kDepthTolerance;
+      const double error = std::abs(metres_per_unit / inverse / truth_m - 1);
+      for (std::size_t i = 0; i < kDepthTolerances.size(); ++i)
+        figures->correct[i] += error < kDepthTolerances[i];
     }
   }
+}
+
+using Triangle = std::array<Eigen::Vector3d, 3>;
+
+// The distance at which a ray from the origin meets a triangle (Moeller and Trumbore 1997); empty if it does
+// not.
+std::optional<double> DistanceToTriangle(const Eigen::Vector3d& ray, const Triangle& triangle) {
+  constexpr double kEdge = 1e-6;  // So that no ray passes between two triangles.
+  const Eigen::Vector3d first = triangle[1] - triangle[0], second = triangle[2] - triangle[0],
+                        across = ray.cross(second);
+  const double determinant = first.dot(across);
+  if (determinant == 0) return std::nullopt;
+  const double u = -triangle[0].dot(across) / determinant;
+  const Eigen::Vector3d along = (-triangle[0]).cross(first);
+  const double v = ray.dot(along) / determinant;
+  if (u < -kEdge || v < -kEdge || u + v > 1 + kEdge) return std::nullopt;
+  const double distance = second.dot(along) / determinant;
+  return distance > 0 ? std::optional(distance) : std::nullopt;
+}
+
+// The largest angle from the optical axis at which the pixels of a level see anything.
+double LargestAngle(const engine::LevelRays& rays) {
+  double least_z = 1;
+  for (int y = 0; y < rays.height_px(); ++y) {
+    for (int x = 0; x < rays.width_px(); ++x) {
+      if (!rays.At(x, y).isZero()) least_z = std::min<double>(least_z, rays.At(x, y).z());
+    }
+  }
+  return std::acos(least_z);
+}
+
+// False if the ball around a triangle lies outside the cone of this angle.
+bool MayBeSeen(const Triangle& triangle, double largest_angle) {
+  const Eigen::Vector3d center = (triangle[0] + triangle[1] + triangle[2]) / 3;
+  double radius = 0;
+  for (const Eigen::Vector3d& corner : triangle) radius = std::max(radius, (corner - center).norm());
+  const double distance = center.norm();
+  return distance <= radius ||
+         std::acos(center.z() / distance) <= largest_angle + std::asin(radius / distance);
+}
+
+// Enters the distances of the pixels of a level that see a triangle, which is in the camera frame, if nothing
+// nearer was entered. A triangle that reaches out of the view of the lens or covers many pixels is divided.
+void EnterTriangle(const engine::CameraModel& camera, const engine::LevelRays& rays, const Triangle& triangle,
+                   double largest_angle, int divisions_left, cv::Mat* inverse_distance) {
+  if (!MayBeSeen(triangle, largest_angle)) return;
+  constexpr double kLargest_px = 32, kMargin_px = 2;  // The image of an edge may be curved.
+  Eigen::AlignedBox2d box;
+  bool inside = true;
+  for (const Eigen::Vector3d& corner : triangle) {
+    const auto pixel = camera.Project(corner);
+    if (pixel) box.extend(engine::LevelFromLevelZero(*pixel, rays.level()));
+    inside = inside && pixel;
+  }
+  if (divisions_left > 0 && (!inside || box.sizes().maxCoeff() > kLargest_px)) {
+    const auto& [a, b, c] = triangle;
+    const Eigen::Vector3d ab = 0.5 * (a + b), bc = 0.5 * (b + c), ca = 0.5 * (c + a);
+    for (const Triangle& part :
+         {Triangle{a, ab, ca}, Triangle{ab, b, bc}, Triangle{ca, bc, c}, Triangle{ab, bc, ca}})
+      EnterTriangle(camera, rays, part, largest_angle, divisions_left - 1, inverse_distance);
+    return;
+  }
+  if (box.isEmpty()) return;
+  const auto begin_of = [](double least) {
+    return static_cast<int>(std::ceil(std::max(0.0, least - kMargin_px)));
+  };
+  const auto end_of = [](double most, int size) {
+    return static_cast<int>(std::floor(std::min<double>(size - 1, most + kMargin_px)));
+  };
+  for (int y = begin_of(box.min().y()); y <= end_of(box.max().y(), rays.height_px()); ++y) {
+    for (int x = begin_of(box.min().x()); x <= end_of(box.max().x(), rays.width_px()); ++x) {
+      const Eigen::Vector3d ray = rays.At(x, y).cast<double>();
+      if (ray.isZero()) continue;
+      const auto distance = DistanceToTriangle(ray, triangle);
+      float& entered = inverse_distance->at<float>(y, x);
+      if (distance) entered = std::max(entered, static_cast<float>(1 / *distance));
+    }
+  }
+}
+
+cv::Mat MeshInverseDistances(const engine::SurfaceMesh& mesh, const engine::CameraModel& camera,
+                             const engine::LevelRays& rays, const engine::Rigid3& camera_from_map) {
+  constexpr int kDivisions = 6;
+  const double largest_angle = LargestAngle(rays);
+  cv::Mat inverse_distance = cv::Mat::zeros(rays.height_px(), rays.width_px(), CV_32FC1);
+  std::vector<Eigen::Vector3d> vertices;
+  for (const Eigen::Vector3f& vertex : mesh.vertices)
+    vertices.push_back(camera_from_map * Eigen::Vector3d(vertex.cast<double>()));
+  for (const auto& [a, b, c] : mesh.triangles)
+    EnterTriangle(camera, rays, {vertices[a], vertices[b], vertices[c]}, largest_angle, kDivisions,
+                  &inverse_distance);
+  return inverse_distance;
 }
 
 // A square of one unlit colour in the plane z = depth of the camera, far larger than the image.
@@ -166,6 +266,17 @@ int SideOf(const Simulation& simulation, int frame, const Eigen::Vector2d& pixel
   return share > 1.03 ? -1 : share < 0.97 ? 1 : 0;
 }
 
+int FrameOf(const engine::MapSnapshot& map, const std::vector<int>& frames, engine::KeyFrameId id) {
+  return frames[static_cast<std::size_t>(map.FindKeyFrame(id) - map.keyframes.data())];
+}
+
+std::vector<int> FramesOf(const engine::MapSnapshot& map, const std::vector<int>& frames,
+                          const std::vector<engine::KeyFrameId>& ids) {
+  std::vector<int> result;
+  for (const engine::KeyFrameId id : ids) result.push_back(FrameOf(map, frames, id));
+  return result;
+}
+
 }  // namespace
 
 DepthFigures MeasureDepthMaps(const Simulation& simulation,
@@ -175,19 +286,29 @@ DepthFigures MeasureDepthMaps(const Simulation& simulation,
   std::map<engine::KeyFrameId, engine::DepthMap> depths;
   for (const engine::DepthViews& views : estimator.views())
     depths.emplace(views.keyframe, *estimator.Estimate(views));
-  const auto frame_of = [&](engine::KeyFrameId id) {
-    return frames[static_cast<std::size_t>(map->FindKeyFrame(id) - map->keyframes.data())];
-  };
   DepthFigures figures;
   for (const engine::DepthViews& views : estimator.views()) {
     std::vector<const engine::DepthMap*> others;
-    std::vector<int> other_frames;
     for (const engine::KeyFrameId id : views.neighbours) {
-      other_frames.push_back(frame_of(id));
       if (const auto found = depths.find(id); found != depths.end()) others.push_back(&found->second);
     }
-    AddDepthMap(simulation, estimator.KeepConsistent(depths.at(views.keyframe), others),
-                frame_of(views.keyframe), other_frames, world_from_map.scale, &figures);
+    const engine::DepthMap depth = estimator.KeepConsistent(depths.at(views.keyframe), others);
+    AddDepths(simulation, depth.inverse_distance, depth.rays->level(), FrameOf(*map, frames, views.keyframe),
+              FramesOf(*map, frames, views.neighbours), world_from_map.scale, &figures);
+  }
+  return figures;
+}
+
+DepthFigures MeasureMesh(const Simulation& simulation, const std::shared_ptr<const engine::MapSnapshot>& map,
+                         const engine::SurfaceMesh& mesh, int level, const std::vector<int>& frames,
+                         const engine::Sim3& world_from_map) {
+  DepthFigures figures;
+  const engine::LevelRays rays(simulation.camera(), level);
+  for (const engine::DepthViews& views : engine::ChooseDepthViews(*map, {})) {
+    const cv::Mat distances = MeshInverseDistances(mesh, simulation.camera(), rays,
+                                                   map->FindKeyFrame(views.keyframe)->camera_from_map);
+    AddDepths(simulation, distances, level, FrameOf(*map, frames, views.keyframe),
+              FramesOf(*map, frames, views.neighbours), world_from_map.scale, &figures);
   }
   return figures;
 }

@@ -14,16 +14,22 @@
 // Compares depth, meshes and hidden content with the exact surfaces of a simulation.
 namespace docent::app {
 
-inline constexpr double kDepthTolerance = 0.02;  // Relative to the true distance.
+// Relative to the true distance.
+inline constexpr std::array<double, 5> kDepthTolerances = {0.005, 0.01, 0.02, 0.05, 0.1};
+inline constexpr std::size_t kTwoPercent = 2;  // Index of the tolerance that limits refer to.
 
 // Counts of pixels; the shares are empty of meaning before something was counted.
 struct DepthFigures {
-  std::size_t seen = 0;     // Pixels whose surface another keyframe sees too.
-  std::size_t known = 0;    // Of these, those with a depth.
-  std::size_t correct = 0;  // Of these, those within kDepthTolerance of the true distance.
+  std::size_t seen = 0;   // Pixels whose surface another keyframe sees too.
+  std::size_t known = 0;  // Of these, those with a depth.
+  std::array<std::size_t, kDepthTolerances.size()> correct = {};  // Of these, those within each tolerance.
 
-  double Completeness() const { return static_cast<double>(correct) / static_cast<double>(seen); }
-  double Accuracy() const { return static_cast<double>(correct) / static_cast<double>(known); }
+  double Completeness(std::size_t tolerance = kTwoPercent) const {
+    return static_cast<double>(correct[tolerance]) / static_cast<double>(seen);
+  }
+  double Accuracy(std::size_t tolerance = kTwoPercent) const {
+    return static_cast<double>(correct[tolerance]) / static_cast<double>(known);
+  }
 };
 
 // Measures the depth maps of all keyframes, checked against each other. frames: the frame of each keyframe.
@@ -31,6 +37,11 @@ struct DepthFigures {
 DepthFigures MeasureDepthMaps(const Simulation& simulation,
                               const std::shared_ptr<const engine::MapSnapshot>& map,
                               const std::vector<int>& frames, const engine::Sim3& world_from_map);
+// Measures how far along their rays the pixels of a pyramid level of each keyframe see the mesh. Level 1 has
+// the pixels of the depth maps, and each level has a quarter of those of the one before.
+DepthFigures MeasureMesh(const Simulation& simulation, const std::shared_ptr<const engine::MapSnapshot>& map,
+                         const engine::SurfaceMesh& mesh, int level, const std::vector<int>& frames,
+                         const engine::Sim3& world_from_map);
 
 struct OcclusionFigures {
   std::size_t behind = 0,
