@@ -46,6 +46,8 @@ void InitializationMonitor::Add(const TrackedFrame& frame) {
 }
 
 void InitializationMonitor::CheckJump(const TrackedFrame& frame) {
+  // Another camera is elsewhere, and a pose from directions alone has no position.
+  if (frame.frame.camera != 0 || frame.finite_points == 0 || frame.state == TrackingState::kPanorama) return;
   const Position now{frame.frame.time, frame.camera_from_map.OriginInSource()};
   if (frame.state == TrackingState::kRelocalized && last_ && before_last_ &&
       now.time - last_->time <= options_.max_gap) {

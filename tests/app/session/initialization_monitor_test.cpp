@@ -3,6 +3,10 @@
 
 #include <gtest/gtest.h>
 
+#include <functional>
+#include <memory>
+#include <optional>
+
 namespace docent::app {
 namespace {
 
@@ -51,7 +55,8 @@ TEST(InitializationMonitor, IgnoresPointsThatTheCameraMovedAwayFrom) {
 
 // The camera moves to the right by a hundredth of the depth from image to image, and relocalizes there or
 // elsewhere.
-std::optional<engine::InitializationMonitor::Fault> JumpAfter(double x, double seconds) {
+std::optional<engine::InitializationMonitor::Fault> JumpAfter(
+    double x, double seconds, const std::function<void(engine::TrackedFrame*)>& change = nullptr) {
   engine::InitializationMonitor monitor;
   engine::TrackedFrame frame;
   frame.state = engine::TrackingState::kSixDof;
@@ -66,6 +71,7 @@ std::optional<engine::InitializationMonitor::Fault> JumpAfter(double x, double s
   for (int i = 0; i < 10; ++i) add(0.01 * i, 0.03 * i);
   EXPECT_FALSE(monitor.FindJump());
   frame.state = engine::TrackingState::kRelocalized;
+  if (change) change(&frame);
   add(x, 0.27 + seconds);
   return monitor.FindJump();
 }
@@ -81,6 +87,11 @@ TEST(InitializationMonitor, AcceptsACameraThatRelocalizesWhereItMovedTo) {
   EXPECT_FALSE(JumpAfter(0.09 + 0.01 + 0.04, 0.03));
   EXPECT_FALSE(JumpAfter(0.09 + 0.06 + 0.04, 0.18)) << "it moved on at its speed";
   EXPECT_FALSE(JumpAfter(0.5, 0.3)) << "it was lost for too long";
+}
+
+TEST(InitializationMonitor, ComparesOnlyPositionsOfOneCamera) {
+  EXPECT_FALSE(JumpAfter(0.5, 0.03, [](engine::TrackedFrame* frame) { frame->frame.camera = 1; }));
+  EXPECT_FALSE(JumpAfter(0.5, 0.03, [](engine::TrackedFrame* frame) { frame->finite_points = 0; }));
 }
 
 TEST(InitializationMonitor, ReportsNothingBeforeTheFirstFrame) {
