@@ -10,6 +10,7 @@
 #include <optional>
 #include <utility>
 
+#include "content/picking.h"
 #include "content/scene.h"
 #include "engine/dense/depth_estimation.h"
 #include "engine/vision/image_pyramid.h"
@@ -49,22 +50,6 @@ void AddDepths(const Simulation& simulation, const cv::Mat& inverse_distance, in
 }
 
 using Triangle = std::array<Eigen::Vector3d, 3>;
-
-// The distance at which a ray from the origin meets a triangle (Moeller and Trumbore 1997); empty if it does
-// not.
-std::optional<double> DistanceToTriangle(const Eigen::Vector3d& ray, const Triangle& triangle) {
-  constexpr double kEdge = 1e-6;  // So that no ray passes between two triangles.
-  const Eigen::Vector3d first = triangle[1] - triangle[0], second = triangle[2] - triangle[0],
-                        across = ray.cross(second);
-  const double determinant = first.dot(across);
-  if (determinant == 0) return std::nullopt;
-  const double u = -triangle[0].dot(across) / determinant;
-  const Eigen::Vector3d along = (-triangle[0]).cross(first);
-  const double v = ray.dot(along) / determinant;
-  if (u < -kEdge || v < -kEdge || u + v > 1 + kEdge) return std::nullopt;
-  const double distance = second.dot(along) / determinant;
-  return distance > 0 ? std::optional(distance) : std::nullopt;
-}
 
 // The largest angle from the optical axis at which the pixels of a level see anything.
 double LargestAngle(const engine::LevelRays& rays) {
@@ -119,7 +104,8 @@ void EnterTriangle(const engine::CameraModel& camera, const engine::LevelRays& r
     for (int x = begin_of(box.min().x()); x <= end_of(box.max().x(), rays.width_px()); ++x) {
       const Eigen::Vector3d ray = rays.At(x, y).cast<double>();
       if (ray.isZero()) continue;
-      const auto distance = DistanceToTriangle(ray, triangle);
+      const auto distance =
+          content::IntersectTriangle({Eigen::Vector3d::Zero(), ray}, triangle[0], triangle[1], triangle[2]);
       float& entered = inverse_distance->at<float>(y, x);
       if (distance) entered = std::max(entered, static_cast<float>(1 / *distance));
     }
