@@ -35,6 +35,7 @@ void CameraTally::Add(const engine::TrackedFrame& frame) {
     return;
   }
   with_pose_ += engine::HasPose(frame.state);
+  by_odometry_ += frame.by_odometry;
   tracking_times_.Add(frame.tracking_time);
 }
 
@@ -47,6 +48,7 @@ std::string FormatCameraReport(const std::vector<CameraTally>& cameras, double k
     list.push_back({{"name", camera.name_},
                     {"frames", camera.frames_},
                     {"with_pose", camera.with_pose_},
+                    {"by_odometry", camera.by_odometry_},
                     {"dropped", camera.dropped_},
                     {"tracking_ms", Percentiles(camera.tracking_times_)},
                     {"latency_ms", latencies},

@@ -42,16 +42,16 @@ class CameraTally {
   friend std::string FormatCameraReport(const std::vector<CameraTally>& cameras, double keyframe_held_s);
 
   std::string name_;
-  int frames_ = 0, with_pose_ = 0, dropped_ = 0;
+  int frames_ = 0, with_pose_ = 0, by_odometry_ = 0, dropped_ = 0;
   DurationHistogram tracking_times_, shown_intervals_;
   std::array<DurationHistogram, 4> ages_;  // By FrameStage.
   std::optional<Timestamp> last_shown_;
   std::optional<Delivery> delivery_;
 };
 
-// JSON: {"cameras": [{name, frames, with_pose, dropped, tracking_ms {median, p95, max}, latency_ms {tracked,
-// taken, drawn, shown}, drawn_interval_ms, delivery}], keyframe_held_ms}; unknown values are null.
-// keyframe_held_s: the longest time that a keyframe waited for the mapper.
+// JSON: {"cameras": [{name, frames, with_pose, by_odometry, dropped, tracking_ms {median, p95, max},
+// latency_ms {tracked, taken, drawn, shown}, drawn_interval_ms, delivery}], keyframe_held_ms}; unknown values
+// are null. keyframe_held_s: the longest time that a keyframe waited for the mapper.
 std::string FormatCameraReport(const std::vector<CameraTally>& cameras, double keyframe_held_s);
 // Throws Error.
 void WriteCameraReport(const std::filesystem::path& path, const std::vector<CameraTally>& cameras,

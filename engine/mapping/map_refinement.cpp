@@ -58,7 +58,7 @@ void MapRefinement::AdjustAroundNewest() {
 
 bool MapRefinement::UpdateReadout() {
   // The errors of a calibration that is not known yet look like those of a readout time.
-  if (!options_.lens.lenses.empty()) return false;
+  if (options_.temporary || !options_.lens.lenses.empty()) return false;
   return CalibrateReadout(options_.readout, options_.adjustment, newest_, &workspace_->map);
 }
 

@@ -56,8 +56,26 @@ void Mapper::ResumeFrom(const MapSnapshot* snapshot) {
   panoramas_.Reset();
 }
 
+void Mapper::HoldKeyFrames() {
+  for (auto& [id, record] : workspace_.map.keyframes()) record.keyframe.fixed = true;
+}
+
+void Mapper::RemoveOldTemporaryKeyFrames() {
+  Map& map = workspace_.map;
+  std::vector<KeyFrameId> temporary;
+  for (const auto& [id, record] : map.keyframes()) {
+    if (!record.keyframe.fixed) temporary.push_back(id);
+  }
+  if (temporary.size() <= options_.max_temporary_keyframes) return;
+  temporary.resize(temporary.size() - options_.max_temporary_keyframes);
+  for (const KeyFrameId id : temporary) CullKeyFrame(id, &map);
+  workspace_.searcher.Clear();
+  output_.Publish(map.Snapshot());
+}
+
 void Mapper::Adopt(std::shared_ptr<const MapSnapshot> snapshot) {
   ResumeFrom(snapshot.get());
+  if (options_.temporary) HoldKeyFrames();
   queue_.Clear();
   output_.Publish(std::move(snapshot));
 }
@@ -99,6 +117,7 @@ void Mapper::Serve(MapperQueue::Request request) {
     if (empty) creation_.CreateFromPanorama(candidate);
   } else if (!empty) {
     insertion_.Insert(candidate, queue_.TakeReports());
+    if (options_.temporary) RemoveOldTemporaryKeyFrames();
   }
 }
 
@@ -111,6 +130,7 @@ double MapperTimes::*Mapper::DoNextTask() {
     refinement_.AdjustAroundNewest();
     return &MapperTimes::bundle_adjustment;
   }
+  if (options_.temporary) return panoramas_.ConvertOne() ? &MapperTimes::infinite_triangulation : nullptr;
   if (loops_.HasLoop() && WorkOnLoops()) return &MapperTimes::loop_closing;
   if (EstimateLenses()) return &MapperTimes::bundle_adjustment;
   // New points keep the camera tracked, so they come before keyframes that could not be localized so far.

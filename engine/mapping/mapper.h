@@ -48,6 +48,10 @@ class Mapper {
   std::vector<EstimatedLens> Lenses() const { return output_.Lenses(); }
 
  private:
+  // Holds the poses of the keyframes that the map has now.
+  void HoldKeyFrames();
+  // Removes the oldest temporary keyframes above their largest number.
+  void RemoveOldTemporaryKeyFrames();
   // Resets the state of the stepping thread to a map; the queue is not changed.
   void ResumeFrom(const MapSnapshot* snapshot);
   void Serve(MapperQueue::Request request);

@@ -46,6 +46,11 @@ struct MapperOptions {
   LensEstimationOptions lens;
   ReadoutEstimationOptions readout;  // of a rolling shutter
   SearchOptions search;
+  // Whether the adopted map is only extended for a while: its keyframes keep their poses, no more than
+  // max_temporary_keyframes of the added ones are kept, and neither loops, lenses nor the whole map are
+  // worked on.
+  bool temporary = false;
+  std::size_t max_temporary_keyframes = 20;
   std::shared_ptr<ImageStore> images;  // stores the keyframes' images; null: in memory
 
   // Describes the first invalid option in one sentence, or empty.

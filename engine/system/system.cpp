@@ -8,12 +8,24 @@
 
 namespace docent::engine {
 
+namespace {
+
+// Maps that are only viewed are extended for visual odometry, in memory.
+MapperOptions MapperOptionsOf(const SystemOptions& options) {
+  MapperOptions mapper = options.mapper;
+  mapper.temporary = !options.extend_maps;
+  if (mapper.temporary) mapper.images.reset();
+  return mapper;
+}
+
+}  // namespace
+
 System::System(const SystemOptions& options, std::vector<std::shared_ptr<const CameraModel>> cameras)
     : options_(Checked(options)),
       state_(cameras.size()),
       calibrations_(&state_),
       policy_(options_, &state_, &calibrations_, &index_, &mapping_),
-      mapping_(options.mapper, options.threaded && options.extend_maps,
+      mapping_(MapperOptionsOf(options), options.threaded,
                [this](const MappingThread::MapperUpdate& update) { OnMapperUpdate(update); }) {
   state_.lenses = options.mapper.lens.lenses;
   TrackerOptions tracker_options = options.tracker;
@@ -47,8 +59,10 @@ TrackedFrame System::Process(const Frame& frame) {
   }
   if (options_.extend_maps) {
     OfferToMapper(index, tracked);
-    if (!options_.threaded) mapping_.RunLockstep();
+  } else {
+    ExtendCopy(index);
   }
+  if (!options_.threaded) mapping_.RunLockstep();
   return tracked;
 }
 
@@ -58,7 +72,7 @@ CameraPlaceFinder System::ApplyOrder(std::size_t index, Timestamp time) {
   Tracker& tracker = *camera->tracker;
   std::uint64_t searched = 0;
   std::optional<CameraPlaceFinder::Prediction> prediction;
-  std::shared_ptr<const MapSnapshot> snapshot;
+  std::shared_ptr<const MapSnapshot> snapshot, copy;
   std::shared_ptr<const CameraModel> model;
   std::uint64_t key = 0;
   auto order = Order::kNone;
@@ -68,6 +82,7 @@ CameraPlaceFinder System::ApplyOrder(std::size_t index, Timestamp time) {
     if (const auto found = state_.maps.find(camera->assignment.map()); found != state_.maps.end()) {
       snapshot = found->second.snapshot;
       key = found->first;
+      if (snapshot && state_.copy.of == snapshot) copy = state_.copy.extended;
     }
     order = camera->assignment.TakeOrder(snapshot && snapshot->HasFinitePoints());
     searched = state_.association.SearchedMap(index);
@@ -87,6 +102,7 @@ CameraPlaceFinder System::ApplyOrder(std::size_t index, Timestamp time) {
   }
   tracker.SetCamera(std::move(model));
   tracker.SetMap(std::move(snapshot), key);
+  tracker.SetOdometryCopy(std::move(copy));
   const PlaceFinder* const all = finder_ != nullptr ? finder_ : &index_;
   return CameraPlaceFinder(all, searched, std::move(prediction));
 }
@@ -123,7 +139,40 @@ void System::OfferToMapper(std::size_t index, const TrackedFrame& frame) {
   state_.Emit(frame.frame.time, key, KeyFrameOffered{accepted}, index);
 }
 
+void System::ExtendCopy(std::size_t index) {
+  Tracker& tracker = *state_.cameras[index].tracker;
+  const bool invalid = tracker.TakeInvalidOdometryCopy();
+  std::optional<KeyFrameCandidate> candidate = tracker.TakeKeyFrameCandidate();
+  std::uint64_t number = 0;
+  {
+    const std::scoped_lock lock(mutex_);
+    const KnownMap* const map = state_.FindMap(state_.cameras[index].assignment.map());
+    const auto snapshot = map ? map->snapshot : nullptr;
+    if (state_.copy.number != 0 && (invalid || state_.copy.of != snapshot)) {
+      state_.copy = {};
+      mapping_.Adopt(0, nullptr);
+    }
+    if (!candidate || !snapshot) return;
+    if (state_.copy.number == 0) {
+      state_.copy = {++copies_, snapshot, nullptr};
+      mapping_.Adopt(state_.copy.number, snapshot);
+    }
+    number = state_.copy.number;
+  }
+  if (mapping_.Offer(number, std::move(*candidate), {})) tracker.KeyFrameAccepted();
+}
+
+void System::OnCopyExtended(const MappingThread::MapperUpdate& update) {
+  {
+    const std::scoped_lock lock(mutex_);
+    if (!update.failure.empty()) state_.Emit(state_.LastTime(), 0, MapperFailed{update.failure});
+    if (update.snapshot && update.key == state_.copy.number) state_.copy.extended = update.snapshot;
+  }
+  if (event_hook_ && !update.failure.empty()) event_hook_();
+}
+
 void System::OnMapperUpdate(const MappingThread::MapperUpdate& update) {
+  if (!options_.extend_maps) return OnCopyExtended(update);
   // Visual words of new keyframes are computed before locking, so that frames are processed meanwhile.
   std::vector<KeyFrameWords> described;
   if (update.snapshot) described = index_.DescribeNew(update.key, *update.snapshot);

@@ -126,6 +126,9 @@ class System {
   // Applies the pending order to the camera's tracker, and returns the places that it may search.
   CameraPlaceFinder ApplyOrder(std::size_t index, Timestamp time);
   void OfferToMapper(std::size_t index, const TrackedFrame& frame);
+  // While maps are only viewed: offers the keyframes of visual odometry.
+  void ExtendCopy(std::size_t index);
+  void OnCopyExtended(const MappingThread::MapperUpdate& update);
   void OnMapperUpdate(const MappingThread::MapperUpdate& update);
   // Whether the mapper's answer belongs to the last request to join maps; with mutex_ held.
   bool IsAwaited(const MappingThread::MapperUpdate::Join& update, const KnownMap& into);
@@ -138,6 +141,7 @@ class System {
   // Guards the members below except the trackers and the mapping thread; never held while tracking.
   mutable std::mutex mutex_;
   SystemState state_;
+  std::uint64_t copies_ = 0;  // of all maps, for visual odometry
   CameraCalibrations calibrations_;
   MapPolicy policy_;
   MappingThread mapping_;  // last, because its thread calls back into the other members

@@ -48,6 +48,13 @@ struct KnownMap {
   bool MayBeJoined() const { return Exists() && permissions.join && snapshot && snapshot->HasFinitePoints(); }
 };
 
+// The copy of a map that is extended for visual odometry, while maps are only viewed.
+struct OdometryCopy {
+  std::uint64_t number = 0;                     // the mapper's name for it; 0 for none
+  std::shared_ptr<const MapSnapshot> of;        // the map as it is known
+  std::shared_ptr<const MapSnapshot> extended;  // null before the first keyframe
+};
+
 // What a System knows of its cameras and maps. The system's mutex guards all of it except the trackers.
 struct SystemState {
   explicit SystemState(std::size_t number_of_cameras) : association(number_of_cameras) {}
@@ -72,7 +79,8 @@ struct SystemState {
   std::map<std::uint64_t, KnownMap> maps;
   CameraAssociation association;
   CameraRig rig;
-  std::uint64_t active_key = 0;       // the map that the mapper works on; 0 for none
+  std::uint64_t active_key = 0;  // the map that the mapper works on; 0 for none
+  OdometryCopy copy;
   std::vector<EstimatedLens> lenses;  // of cameras with an unknown calibration
   std::vector<SystemEvent> events;
 };

@@ -27,6 +27,9 @@ struct PoseSearch {
   PlaceVerification* verification = nullptr;
   MapHypothesis* hypothesis = nullptr;
   Random* random = nullptr;
+  // Visual odometry goes on with more points than a pose near the last one would need, which therefore has to
+  // satisfy the same conditions as any other pose after a loss.
+  bool has_odometry = false;
 
   // For the place verification; the finder must be given.
   PlaceVerification::Query Query(RelocalizationResult* rejection) const {

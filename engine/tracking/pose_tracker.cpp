@@ -42,6 +42,30 @@ void PoseTracker::Begin(Timestamp time, const Rigid3& camera_from_map, ObservedM
   observed_ = observed;
 }
 
+void PoseTracker::ContinueFrom(const PoseTracker& other) {
+  map_tracker_.ForgetLastFrame();
+  map_tracker_.EnablePanorama(kNoId);
+  readout_map_ = nullptr;
+  SetComparison(other.comparison_);
+  frames_tolerant_ = other.frames_tolerant_;
+  motion_ = other.motion_;
+  mean_twist_ = other.mean_twist_;
+  rotation_center_.Reset();
+  pivot_estimate_ = other.pivot_estimate_;
+  observed_ = other.observed_;
+  inliers_ = other.inliers_;
+  finite_coverage_ = other.finite_coverage_;
+  median_depth_ = other.median_depth_;
+  rotation_rate_ = other.rotation_rate_;
+  poor_rotation_frames_ = 0;
+  rotation_reference_ = other.rotation_reference_;
+  rotation_reference_pose_ = other.rotation_reference_pose_;
+  readout_s_ = other.readout_s_;
+  readout_ = other.readout_;
+  last_points_ = other.last_points_;
+  drift_per_s_ = other.drift_per_s_;
+}
+
 void PoseTracker::ApplyCorrections(const MapSnapshot& before, const MapSnapshot& newer, bool tracked) {
   if (newer.corrections.empty() || newer.corrections.back()->revision <= before.revision) return;
   const KeyFrameId reference_keyframe = FindReferenceKeyFrame(

@@ -37,6 +37,8 @@ class PoseTracker {
   void Reset();
   // A map was started, and this is the newest pose known in it.
   void Begin(Timestamp time, const Rigid3& camera_from_map, ObservedMotion observed);
+  // Goes on from the last pose of another tracker in a copy of its map.
+  void ContinueFrom(const PoseTracker& other);
   // Transforms everything in map coordinates by the corrections between two snapshots. tracked: the last
   // frame had a pose.
   void ApplyCorrections(const MapSnapshot& before, const MapSnapshot& newer, bool tracked);
@@ -83,6 +85,7 @@ class PoseTracker {
   // The readout time of the camera, seconds; see ReadoutMotion.
   const Eigen::Vector2d& readout_s() const { return readout_s_; }
   const Rigid3& last() const { return motion_.last(); }
+  ObservedMotion observed() const { return observed_; }  // what the last pose determined
   // Rotation vector per frame, of the last tracked frame.
   const Eigen::Vector3d& rotation_rate() const { return rotation_rate_; }
   double median_depth() const { return median_depth_; }

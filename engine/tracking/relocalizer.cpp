@@ -46,7 +46,7 @@ Relocalizer::Attempt Relocalizer::SearchNearby(const PoseSearch& search, Tracked
   };
   MapTrackResult result = track(MapTracker::Effort::kRecovery);
   const RejectionReason rejection = search.RejectionReasonOf(result, *search.map);
-  if (!options_.build_maps) {
+  if (!options_.build_maps && !search.has_odometry) {
     // With too few patches on the upper levels for a pose, the predicted pose may still be good.
     for (const auto effort : {MapTracker::Effort::kStandard, MapTracker::Effort::kWide}) {
       if (rejection == RejectionReason::kNone || search.criteria.HoldsTrack(result)) break;

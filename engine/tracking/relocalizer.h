@@ -20,6 +20,8 @@ class Relocalizer {
   void Reset() { leader_ = {}; }
   // The camera is lost since this frame.
   void Lose(Timestamp time);
+  // The camera is lost, but this is where it is.
+  void StayNear(Timestamp time) { lost_since_ = time; }
   // The camera is to be found in a map that it was not tracked in.
   void LoseLongAgo();
   // The camera was relocalized.

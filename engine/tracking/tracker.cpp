@@ -28,7 +28,9 @@ Tracker::Tracker(const TrackerOptions& options, std::shared_ptr<const CameraMode
       verification_(options, camera_),
       relocalizer_(options),
       better_maps_(options),
-      confirmation_(options) {
+      confirmation_(options),
+      odometry_(options, camera_) {
+  odometry_.SetRim(&extractor_.rim());
   pose_.SetRim(&extractor_.rim());
   verification_.SetRim(&extractor_.rim());
 }
@@ -40,6 +42,7 @@ void Tracker::SetCamera(std::shared_ptr<const CameraModel> camera) {
   verification_.SetCamera(camera_);
   initialization_.SetCamera(camera_, &random_);
   offers_.SetCamera(*camera_);
+  odometry_.SetCamera(camera_);
 }
 
 void Tracker::Reset() {
@@ -53,6 +56,7 @@ void Tracker::Reset() {
   relocalizer_.Reset();
   confirmation_.Reset();
   offers_.Reset();
+  odometry_.Reset();
   reports_.Clear();
 }
 
@@ -91,6 +95,7 @@ void Tracker::SetMap(std::shared_ptr<const MapSnapshot> map, std::uint64_t map_k
   } else if (!same) {
     pose_.Reset();
     offers_.Restart();
+    odometry_.Reset();
     reports_.Clear();
     confirmation_.EnterOtherMap();
     state_ = CameraState::kLost;
@@ -113,6 +118,7 @@ void Tracker::Track(const Frame& frame, const PlaceFinder* places, TrackedFrame*
   out->frame = frame;
   initialization_.BeginFrame();
   offers_.BeginFrame();
+  odometry_.BeginFrame();
   image_.time = frame.time;
   image_.camera = camera_;
   image_.previous = std::exchange(image_.features, nullptr);
@@ -130,7 +136,7 @@ void Tracker::Track(const Frame& frame, const PlaceFinder* places, TrackedFrame*
       break;
     case CameraState::kNoMap:
     case CameraState::kLost:
-      Use(relocalizer_.Search(SearchIn(places), out), out);
+      SearchLost(frame, places, out);
       break;
   }
   if (initialization_.is_on() && map_) SearchInitialPair(out);
@@ -156,8 +162,19 @@ void Tracker::TrackMap(const Frame& frame, const PlaceFinder* places, TrackedFra
   // that.
   const bool left_unconfirmed =
       estimate.outcome == Outcome::kRotationOnly && options_.build_maps && confirmation_.is_pending();
-  if (estimate.outcome == Outcome::kPose ||
-      (estimate.outcome == Outcome::kRotationOnly && !left_unconfirmed)) {
+  // Where the map has few points, or only the rotation is known, a pose that comes from the points of the
+  // visit as well is more certain.
+  std::optional<MapTrackResult> continued;
+  const bool certain =
+      estimate.outcome == Outcome::kPose && estimate.result.finite_inliers >= options_.min_recovery_inliers;
+  if (!options_.build_maps && !certain) {
+    odometry_.Begin(pose_);
+    frames_of_odometry_ = 0;
+    if (odometry_.is_active() && estimate.outcome != Outcome::kLost)
+      continued = odometry_.Track(image_, frame.commanded_rotation, &random_);
+  }
+  if (!continued && (estimate.outcome == Outcome::kPose ||
+                     (estimate.outcome == Outcome::kRotationOnly && !left_unconfirmed))) {
     out->state = TrackingState::kSixDof;
     Accept(estimate.result, out);
     if (estimate.outcome == Outcome::kRotationOnly) out->hint = Hint::kLowTexture;
@@ -171,6 +188,35 @@ void Tracker::TrackMap(const Frame& frame, const PlaceFinder* places, TrackedFra
   out->left_map = estimate.outcome == Outcome::kLeftMap || left_unconfirmed;
   // The same image may be recognized, so that unexpected motion does not cost a frame.
   if (estimate.outcome == Outcome::kLost) Use(relocalizer_.Search(SearchIn(places), out), out);
+  if (HasPose(out->state)) return;
+  if (!continued && odometry_.is_active())
+    continued = odometry_.Track(image_, frame.commanded_rotation, &random_);
+  ContinueByOdometry(continued, out);
+}
+
+void Tracker::SearchLost(const Frame& frame, const PlaceFinder* places, TrackedFrame* out) {
+  // With visual odometry the camera is near the predicted pose, and other places are searched about four
+  // times a second: odometry needs the images in between, and a search takes as long as several of them.
+  constexpr unsigned kInterval = 8;
+  const bool odometry = odometry_.is_active();
+  const bool everywhere =
+      !odometry_.has_pose() || hypothesis_.exists() || ++frames_of_odometry_ % kInterval == 0;
+  Use(relocalizer_.Search(SearchIn(everywhere ? places : nullptr), out), out);
+  if (!odometry || HasPose(out->state)) return;
+  ContinueByOdometry(odometry_.Track(image_, frame.commanded_rotation, &random_), out);
+  if (!HasPose(out->state)) Use(relocalizer_.Search(SearchIn(places), out), out);
+}
+
+void Tracker::ContinueByOdometry(const std::optional<MapTrackResult>& result, TrackedFrame* out) {
+  if (!result) return;
+  pose_.MissAt(image_.time, result->camera_from_map);
+  relocalizer_.StayNear(image_.time);
+  out->state = TrackingState::kSixDof;
+  out->by_odometry = true;
+  out->left_map = false;
+  const bool good = criteria_.IsGood(*result);
+  out->hint = good ? Hint::kNone : Hint::kMoveMoreSlowly;
+  SetPose(*result, good, out);
 }
 
 PoseSearch Tracker::SearchIn(const PlaceFinder* places) {
@@ -184,7 +230,8 @@ PoseSearch Tracker::SearchIn(const PlaceFinder* places) {
           .retrieval = &retrieval_,
           .verification = &verification_,
           .hypothesis = &hypothesis_,
-          .random = &random_};
+          .random = &random_,
+          .has_odometry = odometry_.has_pose()};
 }
 
 void Tracker::SearchBetterMaps(const PlaceFinder& places, TrackedFrame* out) {
@@ -206,6 +253,7 @@ void Tracker::SearchBetterMaps(const PlaceFinder& places, TrackedFrame* out) {
 
 void Tracker::Use(const std::optional<FoundPose>& found, TrackedFrame* out) {
   if (!found) return;
+  if (found->how != FoundPose::How::kNearby) odometry_.Reset();
   const bool entered = found->how == FoundPose::How::kEntered;
   if (entered) {
     if (found->map_key != map_key_) confirmation_.EnterOtherMap();
@@ -213,8 +261,10 @@ void Tracker::Use(const std::optional<FoundPose>& found, TrackedFrame* out) {
     map_key_ = found->map_key;
     reports_.Clear();
   }
-  out->state = TrackingState::kRelocalized;
-  if (found->how != FoundPose::How::kNearby) out->hint = Hint::kNone;
+  // From visual odometry, the camera returns to the points of the map without having been lost.
+  const bool was_lost = !odometry_.has_pose();
+  out->state = was_lost ? TrackingState::kRelocalized : TrackingState::kSixDof;
+  if (found->how != FoundPose::How::kNearby || !was_lost) out->hint = Hint::kNone;
   Accept(found->result, out);
   if (entered) confirmation_.CountHypothesis();
 }
@@ -233,20 +283,10 @@ void Tracker::Accept(const MapTrackResult& result, TrackedFrame* out) {
     offers_.Restart();
   } else {
     may_extend = confirmation_.Add(result, good);
-    if (result.observed == ObservedMotion::kHybrid) out->state = TrackingState::kHybrid;
-    if (result.observed == ObservedMotion::kPanorama) out->state = TrackingState::kPanorama;
   }
   pose_.Accept(image_, result, relocalized);
   state_ = TrackedState(confirmation_);
-  out->relocalization = {};
-  out->map = map_;
-  out->map_key = map_key_;
-  out->camera_from_map = result.camera_from_map;
-  out->covariance = result.covariance;
-  out->quality = result.Quality();
-  out->quality_class = good ? TrackingQuality::kGood : TrackingQuality::kBad;
-  out->finite_points = result.finite_inliers;
-  out->infinite_points = result.inliers - result.finite_inliers;
+  SetPose(result, good, out);
   const MapTracker& tracked = pose_.map_tracker();
   const bool from_points = result.inliers > 0;
   if (from_points) {
@@ -256,9 +296,32 @@ void Tracker::Accept(const MapTrackResult& result, TrackedFrame* out) {
   if (!good) out->hint = Hint::kMoveMoreSlowly;
   if ((good || !from_points) && may_extend && options_.build_maps)
     offers_.Consider(image_, *map_, {result, out->matches, tracked.panorama(), pose_.median_depth()});
+  if (!options_.build_maps && from_points)
+    odometry_.AddMapPose(image_, *map_, {result, out->matches, tracked.panorama(), pose_.median_depth()},
+                         good);
+}
+
+void Tracker::SetPose(const MapTrackResult& result, bool good, TrackedFrame* out) const {
+  if (out->state != TrackingState::kRelocalized) {
+    if (result.observed == ObservedMotion::kHybrid) out->state = TrackingState::kHybrid;
+    if (result.observed == ObservedMotion::kPanorama) out->state = TrackingState::kPanorama;
+  }
+  out->relocalization = {};
+  out->map = map_;
+  out->map_key = map_key_;
+  out->camera_from_map = result.camera_from_map;
+  out->covariance = result.covariance;
+  out->quality = result.Quality();
+  out->quality_class = good ? TrackingQuality::kGood : TrackingQuality::kBad;
+  out->finite_points = result.finite_inliers;
+  out->infinite_points = result.inliers - result.finite_inliers;
 }
 
 void Tracker::KeyFrameAccepted() {
+  if (!options_.build_maps) {
+    odometry_.offers().Accept();
+    return;
+  }
   if (const auto time = offers_.Accept()) initialization_.AddKeyFrame(*time, pose_.rotation_rate());
 }
 

@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <memory>
 #include <optional>
+#include <utility>
 #include <vector>
 
 #include "engine/base/random.h"
@@ -20,6 +21,7 @@
 #include "engine/tracking/relocalizer.h"
 #include "engine/tracking/tracked_frame.h"
 #include "engine/tracking/tracker_options.h"
+#include "engine/tracking/visual_odometry.h"
 
 namespace docent::engine {
 
@@ -53,6 +55,11 @@ class Tracker {
   // When the camera relocalizes in another map, the TrackedFrame has that map's key and snapshot, and the
   // caller is expected to set it.
   void SetMap(std::shared_ptr<const MapSnapshot> map, std::uint64_t map_key);
+  // While maps are only viewed: the newest state of the copy of the tracked map that the mapper extends with
+  // the keyframes of this tracker (VisualOdometry); null if there is none.
+  void SetOdometryCopy(std::shared_ptr<const MapSnapshot> copy) { odometry_.SetCopy(std::move(copy)); }
+  // True once after that copy became invalid.
+  bool TakeInvalidOdometryCopy() { return odometry_.TakeInvalidCopy(); }
   // Discards the track and an initialization in progress.
   void Reset();
   // Starts the initialization of a new map; until SetMap provides one, frames are `initializing`.
@@ -75,12 +82,18 @@ class Tracker {
   // What the last frame offers to the mapper. Each item is returned once. A candidate counts as refused
   // unless KeyFrameAccepted follows before the next frame; then the next frame that should become a keyframe
   // is offered. When the initial pair is refused, call StartFailed.
-  std::optional<KeyFrameCandidate> TakeKeyFrameCandidate() { return offers_.Take(); }
+  std::optional<KeyFrameCandidate> TakeKeyFrameCandidate() {
+    return options_.build_maps ? offers_.Take() : odometry_.offers().Take();
+  }
   void KeyFrameAccepted();
   std::optional<InitialPair> TakeInitialPair() { return initialization_.TakePair(); }
   std::vector<PointReport> TakeReports() { return reports_.Take(); }
 
  private:
+  void SearchLost(const Frame& frame, const PlaceFinder* places, TrackedFrame* out);
+  // The pose of a lost frame by visual odometry; nothing where there is none.
+  void ContinueByOdometry(const std::optional<MapTrackResult>& result, TrackedFrame* out);
+  void SetPose(const MapTrackResult& result, bool good, TrackedFrame* out) const;
   void TrackMap(const Frame& frame, const PlaceFinder* places, TrackedFrame* out);
   void SearchBetterMaps(const PlaceFinder& places, TrackedFrame* out);
   void SearchInitialPair(TrackedFrame* out);
@@ -103,6 +116,8 @@ class Tracker {
   Relocalizer relocalizer_;
   BetterMapSearch better_maps_;
   RelocalizationConfirmation confirmation_;
+  VisualOdometry odometry_;
+  unsigned frames_of_odometry_ = 0;
 
   CameraState state_ = CameraState::kNoMap;
   std::shared_ptr<const MapSnapshot> map_;

@@ -44,6 +44,8 @@ std::optional<std::string> TrackerOptions::Validate() const {
       .Positive(max_tolerant_sigma, "sigma with photometric tolerance")
       .AtLeast(min_tight_inliers, 1, "number of inliers of a tight pose")
       .Positive(max_tight_sigma, "sigma of a tight pose")
+      .AtLeast(few_points_of_map, 0, "number of few points of a map")
+      .AtLeast(max_odometry_s, 0, "time of visual odometry")
       .Contained(features.Validate())
       .Contained(map_tracker.Validate())
       .Contained(initializer.Validate())

@@ -113,6 +113,12 @@ struct TrackerOptions {
   // poses with 13 to 29 inliers and a sigma of 0.4 to 0.9 were right to 3 cm.
   int min_tight_inliers = 12;
   double max_tight_sigma = 1.0;
+  // While maps are only viewed: with fewer finite inliers of the map than this, a quarter of what is searched
+  // per frame, images are kept for visual odometry.
+  int few_points_of_map = 150;
+  // Longest time of visual odometry without the map, in seconds; 0 for none. Later the position is uncertain
+  // by more than what content tolerates.
+  double max_odometry_s = 10.0;
   ReadoutOptions readout;  // of a rolling shutter
   bool build_maps = true;  // if false, a frame without a map is lost, not initializing
 

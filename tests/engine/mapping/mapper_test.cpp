@@ -224,6 +224,31 @@ TEST_F(MapperTest, KeepsTheMapValidWhileKeyframesInterruptIt) {
   EXPECT_EQ(Validate(*mapper.Snapshot()), "");
 }
 
+TEST_F(MapperTest, KeepsTheAdoptedKeyframesOfATemporaryMapAndTheNewestOfTheOthers) {
+  MapperOptions options;
+  options.temporary = true;
+  options.max_temporary_keyframes = 2;
+  Mapper mapper(options);
+  mapper.Adopt(started_);
+  for (int i = 0; i < 5; ++i) {
+    ASSERT_TRUE(
+        mapper.Offer(TrueCandidate(*world_, *started_, CameraAt({0.2 + 0.1 * i, 0.03 * i, 0}), 1 + i)));
+    WorkUntilIdle(&mapper);
+    EXPECT_EQ(Validate(*mapper.Snapshot()), "");
+  }
+  const MapSnapshot& map = *mapper.Snapshot();
+  ASSERT_EQ(map.keyframes.size(), started_->keyframes.size() + 2);
+  for (const KeyFrame& before : started_->keyframes) {
+    const KeyFrame* const after = map.FindKeyFrame(before.id);
+    ASSERT_NE(after, nullptr);
+    EXPECT_EQ((after->camera_from_map * before.camera_from_map.inverse()).Log().norm(), 0);
+  }
+  EXPECT_EQ(map.keyframes[map.keyframes.size() - 2].time, FromSeconds(4));
+  EXPECT_EQ(map.keyframes.back().time, FromSeconds(5));
+  EXPECT_GT(map.points.size(), started_->points.size());
+  EXPECT_LT(MedianDistanceToSurface(map), 0.02);
+}
+
 TEST_F(MapperTest, RemovesPointsThatTheTrackersReportAsOutliers) {
   Mapper mapper({});
   mapper.Adopt(started_);

@@ -1,0 +1,107 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "engine/tracking/visual_odometry.h"
+
+#include <utility>
+
+namespace docent::engine {
+
+namespace {
+
+// Odometry depends on points that were seen a moment ago, so that it needs more keyframes than a map: one as
+// soon as a tenth of the points of the nearest keyframe is lost (Mur-Artal, Montiel and Tardós 2015, section
+// V-E). With the map's ratio of 0.6, a camera before plain cupboards had 30 points left when the next one
+// came.
+TrackerOptions WithMoreKeyFrames(TrackerOptions options) {
+  options.keyframes.min_found_ratio = 0.9;
+  return options;
+}
+
+}  // namespace
+
+VisualOdometry::VisualOdometry(const TrackerOptions& options,
+                               const std::shared_ptr<const CameraModel>& camera)
+    : options_(WithMoreKeyFrames(options)),
+      criteria_(options_),
+      pose_(options_, camera),
+      offers_(options_, *camera),
+      relocalizer_(options_) {}
+
+void VisualOdometry::SetCamera(const std::shared_ptr<const CameraModel>& camera) {
+  pose_.SetCamera(camera);
+  offers_.SetCamera(*camera);
+}
+
+void VisualOdometry::SetCopy(std::shared_ptr<const MapSnapshot> copy) {
+  copy_ = std::move(copy);
+  if (!copy_) active_ = false;
+}
+
+void VisualOdometry::Reset() {
+  invalid_copy_ = invalid_copy_ || copy_ != nullptr;
+  SetCopy(nullptr);
+  pose_.Reset();
+  offers_.Reset();
+}
+
+void VisualOdometry::AddMapPose(const CameraImage& image, const MapSnapshot& map,
+                                const KeyFrameOffers::TrackedPose& pose, bool good) {
+  // What was added during a long odometry may be as far off as its pose.
+  if (active_ && image.time - last_map_pose_ > FromSeconds(options_.short_loss_s)) Reset();
+  active_ = false;
+  last_map_pose_ = image.time;
+  if (good && options_.max_odometry_s > 0 && pose.result.finite_inliers < options_.few_points_of_map)
+    offers_.Consider(image, copy_ ? *copy_ : map, pose);
+}
+
+void VisualOdometry::Begin(const PoseTracker& lost) {
+  if (active_ || !copy_ || lost.observed() == ObservedMotion::kPanorama) return;
+  pose_.ContinueFrom(lost);
+  lost_since_.reset();
+  active_ = true;
+}
+
+std::optional<MapTrackResult> VisualOdometry::Track(const CameraImage& image,
+                                                    const std::optional<Rotation3>& commanded,
+                                                    Random* random) {
+  if (image.time - last_map_pose_ > FromSeconds(options_.max_odometry_s) ||
+      (lost_since_ && image.time - *lost_since_ > FromSeconds(options_.short_loss_s))) {
+    active_ = false;
+    return std::nullopt;
+  }
+  if (lost_since_) return Recover(image, random);
+  PoseTracker::Estimate estimate = pose_.Track(*copy_, image, commanded, offers_.policy(), random);
+  using Outcome = PoseTracker::Estimate::Outcome;
+  if (estimate.outcome == Outcome::kLost || estimate.outcome == Outcome::kLeftMap) {
+    lost_since_ = image.time;
+    pose_.Lose(image.time);
+    relocalizer_.Lose(image.time);
+    return std::nullopt;
+  }
+  pose_.Accept(image, estimate.result, /*relocalized=*/false);
+  if (criteria_.IsGood(estimate.result) && estimate.result.inliers > 0) {
+    CameraImage moving = image;
+    moving.camera = pose_.image_camera();
+    const MapTracker& tracked = pose_.map_tracker();
+    offers_.Consider(moving, *copy_,
+                     {estimate.result, tracked.matches(), tracked.panorama(), pose_.median_depth()});
+  }
+  return estimate.result;
+}
+
+std::optional<MapTrackResult> VisualOdometry::Recover(const CameraImage& image, Random* random) {
+  TrackedFrame unused;
+  const PoseSearch search = {.image = image,
+                             .map = copy_,
+                             .policy = offers_.policy(),
+                             .criteria = criteria_,
+                             .pose = &pose_,
+                             .hypothesis = &hypothesis_,
+                             .random = random};
+  const auto found = relocalizer_.Search(search, &unused);
+  if (!found) return std::nullopt;
+  lost_since_.reset();
+  pose_.Accept(image, found->result, /*relocalized=*/true);
+  return found->result;
+}
+
+}  // namespace docent::engine
