@@ -50,8 +50,8 @@ struct MapperOptions {
   // max_temporary_keyframes of the added ones are kept, and neither loops, lenses nor the whole map are
   // worked on.
   bool temporary = false;
-  std::size_t max_temporary_keyframes = 20;
-  std::shared_ptr<ImageStore> images;  // stores the keyframes' images; null: in memory
+  std::size_t max_temporary_keyframes = 20;  // chosen to bound the memory, not measured
+  std::shared_ptr<ImageStore> images;        // stores the keyframes' images; null: in memory
 
   // Describes the first invalid option in one sentence, or empty.
   std::optional<std::string> Validate() const;

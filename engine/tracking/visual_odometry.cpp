@@ -9,8 +9,8 @@ namespace {
 
 // Odometry depends on points that were seen a moment ago, so that it needs more keyframes than a map: one as
 // soon as a tenth of the points of the nearest keyframe is lost (Mur-Artal, Montiel and Tardós 2015, section
-// V-E). With the map's ratio of 0.6, a camera before plain cupboards had 30 points left when the next one
-// came.
+// V-E). With the map's ratio of 0.6, a camera before plain cupboards was lost with 28 points
+// before the next one came.
 TrackerOptions WithMoreKeyFrames(TrackerOptions options) {
   options.keyframes.min_found_ratio = 0.9;
   return options;
