@@ -91,7 +91,7 @@ double LossWeight(double error, double threshold, bool tukey) {
 
 // Prior constraints on the motion in addition to the measurements.
 struct MotionConstraint {
-  bool rotation_only = false;  // the pivot is fixed as in the rotation prior; only the rotation is estimated
+  bool rotation_only = false;  // the pivot is fixed as in the motion prior; only the rotation is estimated
   double sigma = 0;  // otherwise: standard deviation of the pivot's position, map units; 0 for no constraint
   double infinite_weight = 1;
 };
@@ -99,7 +99,7 @@ struct MotionConstraint {
 // One robust Gauss-Newton refinement of a pose. Used on the stack of one RefinePose call.
 class PoseDescent {
  public:
-  PoseDescent(const CameraModel& camera, const PoseRefinementOptions& options, const RotationPrior& prior,
+  PoseDescent(const CameraModel& camera, const PoseRefinementOptions& options, const MotionPrior& prior,
               const MotionConstraint& constraint, std::vector<PoseMeasurement>* measurements,
               PoseRefinementMemory* memory)
       : camera_(camera),
@@ -126,7 +126,7 @@ class PoseDescent {
 
   const CameraModel& camera_;
   const PoseRefinementOptions& options_;
-  const RotationPrior& prior_;
+  const MotionPrior& prior_;
   const MotionConstraint& constraint_;
   const Eigen::Vector3d pivot_;  // of the rotation, camera frame
   const Eigen::Vector3d pivot_in_map_;
@@ -263,6 +263,7 @@ std::optional<std::string> PoseRefinementOptions::Validate() const {
       .Ratio(min_weight, "weight of an inlier")
       .Ratio(infinite_weight, "weight of an infinite point")
       .AtLeast(min_finite, 0, "number of finite points that determine the translation")
+      .AtLeast(common_error_factor, 1, "factor of the common errors of points")
       .Positive(max_position_sigma, "position sigma of a determined translation")
       .Positive(prior_translation_sigma, "translation sigma of a rotation")
       .fault();
@@ -270,7 +271,7 @@ std::optional<std::string> PoseRefinementOptions::Validate() const {
 
 PoseRefinement RefinePose(const CameraModel& camera, const Rigid3& start,
                           const PoseRefinementOptions& options, std::vector<PoseMeasurement>* measurements,
-                          PoseRefinementMemory* memory, const RotationPrior& prior) {
+                          PoseRefinementMemory* memory, const MotionPrior& prior) {
   const auto finite = std::count_if(measurements->begin(), measurements->end(),
                                     [](const PoseMeasurement& m) { return !m.infinite(); });
   const auto infinite = static_cast<std::ptrdiff_t>(measurements->size()) - finite;
@@ -279,13 +280,21 @@ PoseRefinement RefinePose(const CameraModel& camera, const Rigid3& start,
   if (finite >= options.min_finite || !rotation_observable) {
     constraint.infinite_weight = options.infinite_weight;
     PoseRefinement result = PoseDescent(camera, options, prior, constraint, measurements, memory).From(start);
-    const Rigid3 camera_from_map_without_prior = result.camera_from_map;
+    Rigid3 camera_from_map_without_prior = result.camera_from_map;
     const bool enough_finite = result.finite_inliers >= options.min_finite;
     const bool position_observable =
         enough_finite && IsPositionObservable(result, options.max_position_sigma);
-    if (prior.reliable && enough_finite && !IsPositionObservable(result, options.max_position_sigma / 2)) {
+    const bool needs_prior = !enough_finite || !IsPositionObservable(result, options.max_position_sigma / 2);
+    if (prior.reliable && enough_finite && needs_prior) {
       constraint.sigma = options.prior_translation_sigma * result.mean_depth;
       result = PoseDescent(camera, options, prior, constraint, measurements, memory).From(start);
+    } else if (prior.center && needs_prior && (!rotation_observable || position_observable)) {
+      constraint.sigma = prior.center->sigma / options.common_error_factor;
+      const MotionPrior center{Eigen::Vector3d::Zero(),
+                               Rigid3(start.rotation, -(start.rotation * prior.center->center))};
+      result = PoseDescent(camera, options, center, constraint, measurements, memory).From(start);
+      result.used_center = true;
+      camera_from_map_without_prior = result.camera_from_map;
     }
     if (!rotation_observable || position_observable || constraint.sigma > 0) {
       result.camera_from_map_without_prior = camera_from_map_without_prior;

@@ -297,10 +297,12 @@ void MapTracker::RefineAgain(const Rigid3& predicted, MapTrackResult* result) {
 
 void MapTracker::Refine(const Rigid3& predicted, const PoseRefinementOptions& options,
                         MapTrackResult* result) {
-  const PoseRefinement fine = RefinePose(*camera_, result->camera_from_map, options, &measurements_, &memory_,
-                                         {pivot_estimate_.pivot, predicted, pivot_estimate_.reliable});
+  const PoseRefinement fine =
+      RefinePose(*camera_, result->camera_from_map, options, &measurements_, &memory_,
+                 {pivot_estimate_.pivot, predicted, pivot_estimate_.reliable, predicted_center_});
   result->camera_from_map = fine.camera_from_map;
   result->camera_from_map_without_prior = fine.camera_from_map_without_prior;
+  result->used_center = fine.used_center;
   result->covariance = fine.covariance;
   result->observed = fine.observed;
   result->converged = fine.converged;

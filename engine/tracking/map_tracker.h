@@ -49,6 +49,7 @@ struct MapTrackerOptions {
 struct MapTrackResult {
   Rigid3 camera_from_map;
   Rigid3 camera_from_map_without_prior;  // the pose without the rotation prior, see PoseRefinement
+  bool used_center = false;              // the predicted centre is part of the pose
   Eigen::Matrix<double, 6, 6> covariance = Eigen::Matrix<double, 6, 6>::Zero();
   ObservedMotion observed = ObservedMotion::kSixDof;
   int attempted = 0, found = 0, inliers = 0;
@@ -96,6 +97,8 @@ class MapTracker {
   const std::vector<PoseMeasurement>& measurements() const { return measurements_; }
   // The rotation centre to assume where the translation cannot be observed.
   void SetPivot(const PivotEstimate& pivot) { pivot_estimate_ = pivot; }
+  // The camera centre to expect in the next calls, until it is set again; empty if it is not known.
+  void SetPredictedCenter(const std::optional<PredictedPosition>& center) { predicted_center_ = center; }
 
   const std::vector<PointMatch>& matches() const { return matches_; }
   // Each point searched in the last call: whether it was found, and whether it was an inlier.
@@ -157,6 +160,7 @@ class MapTracker {
   Rigid3 predicted_;  // pose that the last search started from
   PanoramaId panorama_ = kNoId;
   PivotEstimate pivot_estimate_;
+  std::optional<PredictedPosition> predicted_center_;
   std::vector<PointMatch> matches_;
   std::vector<Attempt> attempts_;
   std::vector<MapPointId> last_inliers_;  // of the last frame, by ascending id

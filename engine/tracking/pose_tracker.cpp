@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <bit>
+#include <cmath>
 #include <opencv2/core.hpp>
 #include <utility>
 
@@ -38,6 +39,7 @@ void PoseTracker::Begin(Timestamp time, const Rigid3& camera_from_map, ObservedM
   map_tracker_.EnablePanorama(kNoId);
   readout_map_ = nullptr;
   motion_.Reset(time, camera_from_map);
+  position_.Reset();
   mean_twist_.reset();
   observed_ = observed;
 }
@@ -49,6 +51,7 @@ void PoseTracker::ContinueFrom(const PoseTracker& other) {
   SetComparison(other.comparison_);
   frames_tolerant_ = other.frames_tolerant_;
   motion_ = other.motion_;
+  position_ = other.position_;
   mean_twist_ = other.mean_twist_;
   rotation_center_.Reset();
   pivot_estimate_ = other.pivot_estimate_;
@@ -75,6 +78,7 @@ void PoseTracker::ApplyCorrections(const MapSnapshot& before, const MapSnapshot&
     const auto moved = correction->after_from_before.find(reference_keyframe);
     if (moved == correction->after_from_before.end()) continue;
     motion_.ApplyCorrection(moved->second);
+    position_.ApplyCorrection(moved->second);
     mean_twist_.reset();
     rotation_reference_pose_ = CorrectedPose(rotation_reference_pose_, moved->second);
     median_depth_ *= moved->second.scale;
@@ -116,6 +120,7 @@ MapTrackResult PoseTracker::TryElsewhere(const MapSnapshot& map, const CameraIma
                                          const Rigid3& guess, PanoramaId panorama, MapTracker::Effort effort,
                                          Random* random) {
   map_tracker_.Clear();
+  map_tracker_.SetPredictedCenter(std::nullopt);
   map_tracker_.EnablePanorama(panorama);
   return TryFrom(map, image, guess, effort, random);
 }
@@ -127,7 +132,17 @@ Rigid3 PoseTracker::PredictAfterLoss(const CameraImage& image) const {
 
 void PoseTracker::MissAt(Timestamp time, const Rigid3& camera_from_map) {
   map_tracker_.ForgetLastFrame();
+  map_tracker_.SetPredictedCenter(std::nullopt);
   motion_.Reset(time, camera_from_map);
+}
+
+void PoseTracker::Follow(const PoseTracker& other, Timestamp time) {
+  MissAt(time, other.last());
+  position_ = other.position_;
+}
+
+void PoseTracker::ExpectPosition(Timestamp time) {
+  map_tracker_.SetPredictedCenter(position_.Predict(time, median_depth_));
 }
 
 MapTrackResult PoseTracker::TrackFromPrediction(const MapSnapshot& map, const CameraImage& image,
@@ -212,8 +227,10 @@ PoseTracker::Estimate PoseTracker::Track(const MapSnapshot& map, const CameraIma
   }
   SearchPanoramaAt(predicted, map, policy);
   map_tracker_.SetPivot(pivot_estimate_);
+  ExpectPosition(image.time);
   MapTrackResult result = TrackFromPrediction(map, image, predicted, random);
   if (!criteria_.IsAccepted(result, comparison_)) {
+    map_tracker_.SetPredictedCenter(std::nullopt);
     // A second attempt with larger radii, from the last pose rotated by the alignment of the thumbnails.
     const auto rotation = image.RotationFromPrevious();
     const Rigid3 rotated = rotation ? motion_.PredictWithRotation(*rotation) : predicted;
@@ -228,6 +245,7 @@ PoseTracker::Estimate PoseTracker::Track(const MapSnapshot& map, const CameraIma
                          : Estimate{Outcome::kLost, result};
   }
   AccountForReadout(image, predicted, &result);
+  map_tracker_.SetPredictedCenter(std::nullopt);
   poor_rotation_frames_ = criteria_.FitsRotation(result, map) ? 0 : poor_rotation_frames_ + 1;
   const bool left = poor_rotation_frames_ >= options_.max_poor_rotation_frames;
   return {left ? Outcome::kLeftMap : Outcome::kPose, result};
@@ -290,6 +308,18 @@ void PoseTracker::UpdateDrift(double seconds) {
   drift_per_s_ += std::clamp(seconds / kTimeConstant_s, 0.0, 1.0) * (drift_per_s - drift_per_s_);
 }
 
+void PoseTracker::UpdatePosition(const CameraImage& image, const MapTrackResult& result) {
+  const double sigma = options_.map_tracker.refinement.common_error_factor *
+                       std::sqrt(result.covariance.topLeftCorner<3, 3>().trace());
+  const bool from_points = result.observed != ObservedMotion::kPanorama && result.finite_inliers > 0;
+  if (!from_points || !(sigma > 0) || !std::isfinite(sigma)) {
+    position_.Reset();
+    return;
+  }
+  position_.Add(image.time, result.camera_from_map.OriginInSource(), sigma, median_depth_,
+                result.used_center);
+}
+
 void PoseTracker::Accept(const CameraImage& image, const MapTrackResult& result, bool relocalized) {
   const Rotation3 previous_rotation = motion_.last().rotation;
   const Timestamp previous_time = motion_.time();
@@ -299,6 +329,7 @@ void PoseTracker::Accept(const CameraImage& image, const MapTrackResult& result,
     drift_per_s_.setZero();
     motion_.Reset(image.time, result.camera_from_map);
     rotation_center_.Reset();
+    position_.Reset();
   } else {
     motion_.Update(image.time, result.camera_from_map);
   }
@@ -307,6 +338,7 @@ void PoseTracker::Accept(const CameraImage& image, const MapTrackResult& result,
   inliers_ = result.inliers;
   finite_coverage_ = result.finite_coverage;
   if (result.finite_inliers > 0 && result.median_depth > 0) median_depth_ = result.median_depth;
+  UpdatePosition(image, result);
   if (options_.hybrid && result.observed != ObservedMotion::kPanorama) {
     rotation_center_.Add(image.time, result.camera_from_map_without_prior, result.covariance, median_depth_);
     pivot_estimate_ = rotation_center_.Estimate(median_depth_);
@@ -324,6 +356,8 @@ void PoseTracker::Lose(Timestamp time) {
   mean_twist_.reset();
   map_tracker_.ForgetLastFrame();
   poor_rotation_frames_ = 0;
+  position_.Reset();
+  map_tracker_.SetPredictedCenter(std::nullopt);
   motion_.Miss(time);
 }
 

@@ -14,6 +14,7 @@
 #include "engine/tracking/map_tracker.h"
 #include "engine/tracking/motion_model.h"
 #include "engine/tracking/pose_criteria.h"
+#include "engine/tracking/position_filter.h"
 #include "engine/tracking/readout_estimator.h"
 #include "engine/tracking/rotation_center.h"
 #include "engine/tracking/tracker_options.h"
@@ -67,6 +68,10 @@ class PoseTracker {
   Rigid3 PredictAfterLoss(const CameraImage& image) const;
   // Assumes this pose, which was tried in vain, in the next frame.
   void MissAt(Timestamp time, const Rigid3& camera_from_map);
+  // This tracker of the same camera has the pose of the present frame.
+  void Follow(const PoseTracker& other, Timestamp time);
+  // The attempts that follow use the predicted position where the points determine it poorly.
+  void ExpectPosition(Timestamp time);
   // Searches the points of the panorama map that this pose needs.
   void SearchPanoramaAt(const Rigid3& camera_from_map, const MapSnapshot& map, const KeyFramePolicy& policy);
   MapTrackResult TryFrom(const MapSnapshot& map, const CameraImage& image, const Rigid3& guess,
@@ -111,6 +116,7 @@ class PoseTracker {
   void SetComparison(PatchComparison comparison);
   // After a pose from finite points, this long after the one before.
   void UpdateDrift(double seconds);
+  void UpdatePosition(const CameraImage& image, const MapTrackResult& result);
 
   TrackerOptions options_;
   PoseCriteria criteria_;
@@ -118,6 +124,7 @@ class PoseTracker {
   SharedPool<CameraModel> image_cameras_;
   MapTracker map_tracker_;
   MotionModel motion_;
+  PositionFilter position_;
   RotationCenter rotation_center_;
   PivotEstimate pivot_estimate_;  // pivot of the present rotation
   // What the last pose determined. After kPanorama the camera centre is kept.

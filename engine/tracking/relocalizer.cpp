@@ -41,6 +41,7 @@ Relocalizer::Attempt Relocalizer::SearchNearby(const PoseSearch& search, Tracked
   if (search.image.time - lost_since_ > FromSeconds(options_.short_loss_s)) return Attempt::kGoOn;
   const Rigid3 guess = search.pose->PredictAfterLoss(search.image);
   search.pose->SearchPanoramaAt(guess, *search.map, search.policy);
+  if (search.has_odometry) search.pose->ExpectPosition(search.image.time);
   const auto track = [&](MapTracker::Effort effort) {
     return search.pose->TryFrom(*search.map, search.image, guess, effort, search.random);
   };

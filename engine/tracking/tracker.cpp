@@ -209,7 +209,7 @@ void Tracker::SearchLost(const Frame& frame, const PlaceFinder* places, TrackedF
 
 void Tracker::ContinueByOdometry(const std::optional<MapTrackResult>& result, TrackedFrame* out) {
   if (!result) return;
-  pose_.MissAt(image_.time, result->camera_from_map);
+  pose_.Follow(odometry_.pose(), image_.time);
   relocalizer_.StayNear(image_.time);
   out->state = TrackingState::kSixDof;
   out->by_odometry = true;

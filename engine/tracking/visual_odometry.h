@@ -43,6 +43,8 @@ class VisualOdometry {
   // Needs is_active().
   std::optional<MapTrackResult> Track(const CameraImage& image, const std::optional<Rotation3>& commanded,
                                       Random* random);
+  // The track in the copy.
+  const PoseTracker& pose() const { return pose_; }
   // True once after the copy became invalid.
   bool TakeInvalidCopy() { return std::exchange(invalid_copy_, false); }
 

@@ -421,5 +421,52 @@ TEST(PoseRefinement, MovesAlongWellConstrainedDirectionsOnly) {
   EXPECT_LT(std::abs(PoseError(refined)[1]), 0.005);
 }
 
+// Adds points of a wall four metres away, in the middle of the image. The map has the wall turned by this
+// angle about the vertical, as keyframes with little parallax leave it.
+void AddTurnedWall(int count, double angle_deg, Random* random, std::vector<PoseMeasurement>* measurements) {
+  const Eigen::Vector3d middle(0, 0, 4);
+  const Rotation3 turn = Rotation3::Exp({0, Radians(angle_deg), 0});
+  for (int i = 0; i < count; ++i) {
+    const double x = random->Uniform(-1, 1), y = random->Uniform(-0.8, 0.8);
+    const Eigen::Vector3d in_camera = middle + Eigen::Vector3d(x, y, 0);
+    PoseMeasurement measurement;
+    measurement.point_in_map << TruePose().inverse() * Eigen::Vector3d(middle + turn * (in_camera - middle)),
+        1;
+    measurement.pixel = *kLens.Project(in_camera) + 0.5 * RandomNormals(random);
+    measurements->push_back(measurement);
+  }
+}
+
+TEST(PoseRefinement, UsesThePredictedCenterBeforeADistantWall) {
+  Random random(37);
+  for (int trial = 0; trial < 10; ++trial) {
+    std::vector<PoseMeasurement> wall;
+    AddTurnedWall(120, 4, &random, &wall);
+    const auto error_m = [&](const std::optional<PredictedPosition>& center) {
+      PoseRefinementMemory memory;
+      const PoseRefinement refined = RefinePose(kLens, TruePose(), {}, &wall, &memory,
+                                                {Eigen::Vector3d::Zero(), TruePose(), false, center});
+      EXPECT_EQ(refined.used_center, center.has_value());
+      EXPECT_EQ(refined.observed, ObservedMotion::kSixDof);
+      return DistanceMoved(refined, TruePose());
+    };
+    EXPECT_GT(error_m(std::nullopt), 0.15);
+    EXPECT_LT(error_m(PredictedPosition{TruePose().OriginInSource(), 0.02}), 0.03);
+  }
+}
+
+TEST(PoseRefinement, IgnoresThePredictedCenterWherePointsTellThePosition) {
+  Random random(41);
+  std::vector<PoseMeasurement> spread;
+  AddMeasurements(300, 0.5, false, &random, &spread);
+  const PredictedPosition wrong{TruePose().OriginInSource() + Eigen::Vector3d(0.2, 0, 0), 1e-3};
+  PoseRefinementMemory memory;
+  const PoseRefinement with = RefinePose(kLens, TruePose(), {}, &spread, &memory,
+                                         {Eigen::Vector3d::Zero(), TruePose(), false, wrong});
+  const PoseRefinement without = Refine(TruePose(), &spread);
+  EXPECT_FALSE(with.used_center);
+  EXPECT_TRUE(IsNear(with.camera_from_map, without.camera_from_map, 1e-12, 1e-12));
+}
+
 }  // namespace
 }  // namespace docent::engine

@@ -43,9 +43,9 @@ Rigid3 PoseOf(int image) {
 
 class VisualOdometryTest : public testing::Test {
  protected:
-  explicit VisualOdometryTest(double max_odometry_s = 10) {
+  explicit VisualOdometryTest(double max_odometry_s = 10, bool threaded = false) {
     SystemOptions options;
-    options.threaded = false;
+    options.threaded = threaded;
     options.extend_maps = false;
     options.tracker.max_odometry_s = max_odometry_s;
     system_ = std::make_unique<System>(options, std::vector{Camera()});
@@ -128,6 +128,21 @@ TEST_F(ShortVisualOdometry, EndsAfterItsLongestTime) {
   EXPECT_FALSE(HasPose(last_.state));
   EXPECT_GE(longest, 10);
   EXPECT_LE(longest, 15) << "half a second";
+}
+
+class ThreadedVisualOdometry : public VisualOdometryTest {
+ protected:
+  ThreadedVisualOdometry() : VisualOdometryTest(/*max_odometry_s=*/10, /*threaded=*/true) {}
+};
+
+// How far the odometry goes depends on how fast the mapper is; what the map shows does not.
+TEST_F(ThreadedVisualOdometry, FindsTheMapAgain) {
+  for (int walk = 0; walk < 2; ++walk) {
+    for (int i = 0; i < 100; ++i) Look(PoseOf(i));
+    for (int i = 100; i > 5; --i) EXPECT_EQ(Look(PoseOf(i)).map, BeginningOfTheWall()) << i;
+    EXPECT_TRUE(HasPose(last_.state));
+    EXPECT_LT(error_, 0.01);
+  }
 }
 
 class NoVisualOdometry : public VisualOdometryTest {
