@@ -48,11 +48,12 @@ def centre(row):
 
 
 def maps_in_world(frames, truth):
-    """truth_from_map of every map with at least ten poses that have ground truth, and the RMSE of each in metres."""
+    """truth_from_map of every map with at least ten poses that have ground truth, and the RMSE of each in metres.
+    Poses without finite points do not count: their positions are those of a panorama map."""
     pairs = collections.defaultdict(lambda: ([], []))
     for row in frames:
         pose, point = truth.at(float(row["timestamp"])), centre(row)
-        if row["map"] and point and pose:
+        if row["map"] and int(row["finite"]) > 0 and point and pose:
             pairs[row["map"]][0].append(pose[0])
             pairs[row["map"]][1].append(point)
     placed = {name: align(*both) for name, both in pairs.items() if len(both[0]) >= 10}
@@ -101,8 +102,8 @@ def visit(arguments, seed, visits, truth):
     run(arguments.docent, "--quiet", "author", *common, "--camera", arguments.output / "build", "--script", script,
         "--output", folder / "author", *arguments.author_option)
     placed, errors = maps_in_world(read_frames(folder / "author"), truth)
-    print(f"seed {seed}: " + "; ".join(f"map {name} built with {100 * e:.1f} cm RMSE" for name, e in errors.items()),
-          flush=True)
+    built = "; ".join(f"map {name} built with {100 * e:.1f} cm RMSE" for name, e in errors.items())
+    print(f"seed {seed}: " + (built or "no map has depth"), flush=True)
     results = {}
     for change, sequence in visits.items():
         output = folder / change.replace(":", "-")
