@@ -78,7 +78,7 @@ std::string SessionState::FreeMapName(const std::string& name) const {
   for (int number = 2;; ++number) {
     const std::string candidate = stem + " " + std::to_string(number);
     const bool taken = std::any_of(maps.begin(), maps.end(), [&](const auto& entry) {
-      return entry.second.Exists() && entry.second.name == candidate;
+      return !entry.second.discarded && entry.second.name == candidate;
     });
     if (!taken) return candidate;
   }

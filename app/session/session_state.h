@@ -51,7 +51,9 @@ struct SessionState {
   // Throws Error if there is no map with this name, or if it has no snapshot.
   SessionMap& InitializedMap(const std::string& name);
   std::string NameOf(std::uint64_t key) const;  // empty when the session has no such map
-  // A name for a map that continues the one of this name: "Hall" becomes "Hall 2", and "Hall 2" "Hall 3".
+  // A name for a map that continues the one of this name: "Hall" becomes "Hall 2", and "Hall 2" "Hall 3". The
+  // name of a map that was joined into another one is not used again: frames.csv has it for the images
+  // before.
   std::string FreeMapName(const std::string& name) const;
   // Signposts that lead to one map lead to another one from now on, or nowhere (key 0). This is no edit that
   // could be undone: it follows from what happened to the maps.

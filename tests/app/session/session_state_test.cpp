@@ -41,6 +41,14 @@ TEST(SessionState, FreesTheNameOfAMapThatWasDiscarded) {
   EXPECT_EQ(state.NameOf(1), "Hall 2");  // what was said about it still has a name
 }
 
+TEST(SessionState, KeepsTheNameOfAMapThatWasJoined) {
+  SessionState state({});
+  state.AddMap(1, "Hall");
+  state.AddMap(2, "Hall 2").joined_into = 1;
+  EXPECT_EQ(state.FreeMapName("Hall"), "Hall 3");
+  EXPECT_EQ(state.FindByName("Hall 2"), nullptr);
+}
+
 TEST(SessionState, RefusesAMapThatIsNotInitialized) {
   SessionState state({});
   EXPECT_THROW(state.InitializedMap("Hall"), Error);
