@@ -94,13 +94,18 @@ Relocalizer::Attempt Relocalizer::ContinueHypothesis(const PoseSearch& search, T
   MapHypothesis& hypothesis = *search.hypothesis;
   if (!hypothesis.exists()) return Attempt::kGoOn;
   MapTrackResult result;
+  RejectionReason rejection = RejectionReason::kFewPoints;
   auto map = search.MapOfHypothesis();
-  if (map) {
+  const auto track = [&](MapTracker::Effort effort) {
     result = search.pose->TryElsewhere(*map, search.image, hypothesis.Predict(search.image),
-                                       hypothesis.panorama(), MapTracker::Effort::kWide, search.random);
-  }
-  const RejectionReason rejection =
-      map ? search.RejectionReasonOf(result, *map) : RejectionReason::kFewPoints;
+                                       hypothesis.panorama(), effort, search.random);
+    rejection = search.RejectionReasonOf(result, *map);
+  };
+  if (map) track(MapTracker::Effort::kStandard);
+  // A wide search finds the wrong ones of things that repeat, such as the squares of a board or windows.
+  // Where that is likely, because few of the points in view are inliers, the pose has to withstand it.
+  const bool poor = result.VisibleInlierRatio() < options_.poor_visible_ratio;
+  if (map && (poor || rejection != RejectionReason::kNone)) track(MapTracker::Effort::kWide);
   if (rejection != RejectionReason::kNone) {
     out->relocalization.Consider(
         {.rejection = rejection, .map_key = hypothesis.map_key(), .inliers = result.inliers});
