@@ -126,10 +126,11 @@ KeyFrameChoice KeyFramePolicy::Select(const PolicyFrame& frame, const MapSnapsho
     const bool leaves_map = unknown && frame.points < options_.few_points;
     const bool pure_rotation = unknown && IsPureRotation(now, frame.median_depth);
     AddToHistory(now);
+    const bool needs_both = options_.opens_by_rotation_with_few_points;
     // Whatever the motion was, infinite points are better than losing the track.
-    if (leaves_map && PanoramaNear(frame.camera_from_map, frame.median_depth, map) == kNoId)
+    if (leaves_map && !needs_both && PanoramaNear(frame.camera_from_map, frame.median_depth, map) == kNoId)
       return KeyFrameChoice::kLocalizedPanorama;
-    if (pure_rotation && frame.coverage < options_.min_panorama_coverage) {
+    if (pure_rotation && (leaves_map || !needs_both) && frame.coverage < options_.min_panorama_coverage) {
       const bool parallax = std::all_of(map.keyframes.begin(), map.keyframes.end(), [&](const KeyFrame& k) {
         return k.kind == KeyFrameKind::kPanorama ||
                HasParallax(k.camera_from_map.OriginInSource(), now.center, frame.median_depth);

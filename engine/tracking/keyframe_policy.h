@@ -28,6 +28,8 @@ struct KeyFramePolicyOptions {
   // suffices for a panorama keyframe.
   int few_points = 60;
   double min_view_ratio_when_few = 0.03;
+  // If true, a panorama map is opened only by a pure rotation with few points, not by either of them.
+  bool opens_by_rotation_with_few_points = false;
   // With fewer inliers than this (half of few_points), a map without finite points gets a keyframe without
   // any rotation.
   int few_points_without_rotation = 30;

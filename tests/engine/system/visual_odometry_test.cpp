@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <memory>
+#include <numbers>
 #include <vector>
 
 #include "engine/system/system.h"
@@ -23,6 +24,14 @@ constexpr int kMapped = 40;     // images in which the camera is near the keyfra
 const RenderedWorld& LongWall() {
   static const RenderedWorld world({testing_world::PaintedWall({3, 0, 2}, Eigen::Vector3d::UnitX(),
                                                                Eigen::Vector3d::UnitY(), 7, 2, /*seed=*/5)});
+  return world;
+}
+
+// The same wall, and another one at a right angle, three metres to the right, that is not mapped.
+const RenderedWorld& Corner() {
+  static const RenderedWorld world(
+      {LongWall().walls().front(), testing_world::PaintedWall({3, 0, 0}, Eigen::Vector3d::UnitZ(),
+                                                              Eigen::Vector3d::UnitY(), 4, 2, /*seed=*/6)});
   return world;
 }
 
@@ -112,6 +121,26 @@ TEST_F(VisualOdometryTest, EndsWhenTheImageChangesAltogether) {
     posed +=
         HasPose(system_->Process(testing_world::MakeFrame(time_++, elsewhere, CameraAt({0, 0, 0}))).state);
   EXPECT_EQ(posed, 0);
+}
+
+// Beyond the map there is no parallax: a panorama map continues the rotation.
+TEST_F(VisualOdometryTest, ContinuesTheRotationOfAVisitorWhoTurnsOnTheSpot) {
+  const Eigen::Vector3d center(0.6, 0, 0);
+  constexpr int kTurnDeg = 100;
+  const auto look_towards = [&](int heading_deg) {
+    const Rigid3 pose = CameraAt(center, {0, static_cast<double>(heading_deg), 0});
+    last_ = system_->Process(testing_world::MakeFrame(time_++, Corner(), pose));
+    return (last_.camera_from_map.rotation * pose.rotation.inverse()).Angle() * 180 / std::numbers::pi;
+  };
+  for (int i = 0; i < 20; ++i) look_towards(0);
+  ASSERT_TRUE(HasPose(last_.state));
+  for (int i = 0; i <= 2 * kTurnDeg; ++i) {
+    const double error_deg = look_towards(std::min(i, 2 * kTurnDeg - i));
+    ASSERT_TRUE(HasPose(last_.state)) << i;
+    EXPECT_NE(last_.state, TrackingState::kRelocalized) << i;
+    EXPECT_LT(error_deg, 1) << i;
+  }
+  EXPECT_FALSE(last_.by_odometry);
 }
 
 class ShortVisualOdometry : public VisualOdometryTest {

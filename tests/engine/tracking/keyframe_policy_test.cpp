@@ -201,6 +201,23 @@ TEST_F(KeyFramePolicyTest, OpensAPanoramaImmediatelyWhenFewPointsAreLeft) {
   EXPECT_EQ(policy_.Select(frame, OpenedMap()), KeyFrameChoice::kNone);
 }
 
+TEST_F(KeyFramePolicyTest, OpensAPanoramaOnlyByARotationWithFewPointsIfBothAreNeeded) {
+  KeyFramePolicyOptions options;
+  options.opens_by_rotation_with_few_points = true;
+  const MapSnapshot map = PlainMap();
+  const auto choose = [&](double turn, int points) {
+    KeyFramePolicy policy(options, kFieldOfView);
+    policy.Select(CoveredFrame(1, RotatedBy(0)), map);
+    PolicyFrame frame = HalfCovered(2, RotatedBy(turn));
+    frame.points = points;
+    frame.needs_six_dof = true;
+    return policy.Select(frame, map);
+  };
+  EXPECT_EQ(choose(0, 59), KeyFrameChoice::kSixDof);
+  EXPECT_EQ(choose(kViewTurnDeg + 0.1, 60), KeyFrameChoice::kSixDof);
+  EXPECT_EQ(choose(kViewTurnDeg + 0.1, 59), KeyFrameChoice::kLocalizedPanorama);
+}
+
 TEST_F(KeyFramePolicyTest, OffersNothingWhileAClosedPanoramaTracksTheCamera) {
   PolicyFrame frame = RotationOnly(2, RotatedBy(30));
   frame.needs_six_dof = true;
