@@ -18,6 +18,7 @@ std::optional<std::string> InitializationMonitorOptions::Validate() const {
       .Positive(max_rotation, "rotation from the first view")
       .NotNegative(max_gap, "time before a relocalization")
       .Positive(max_jump, "jump at a relocalization")
+      .Positive(max_rotation_jump, "jump of the viewing direction at a relocalization")
       .fault();
 }
 
@@ -48,14 +49,21 @@ void InitializationMonitor::Add(const TrackedFrame& frame) {
 void InitializationMonitor::CheckJump(const TrackedFrame& frame) {
   // Another camera is elsewhere, and a pose from directions alone has no position.
   if (frame.frame.camera != 0 || frame.finite_points == 0 || frame.state == TrackingState::kPanorama) return;
-  const Position now{frame.frame.time, frame.camera_from_map.OriginInSource()};
+  const Pose now{frame.frame.time, frame.camera_from_map};
   if (frame.state == TrackingState::kRelocalized && last_ && before_last_ &&
       now.time - last_->time <= options_.max_gap) {
-    const double speed = (last_->center_in_map - before_last_->center_in_map).norm() /
-                         ToSeconds(last_->time - before_last_->time);
-    const double unexplained =
-        (now.center_in_map - last_->center_in_map).norm() - speed * ToSeconds(now.time - last_->time);
-    if (unexplained > options_.max_jump * depth_) jump_ = unexplained / depth_;
+    const auto distance = [](const Pose& a, const Pose& b) {
+      return (a.camera_from_map.OriginInSource() - b.camera_from_map.OriginInSource()).norm();
+    };
+    const auto rotation = [](const Pose& a, const Pose& b) {
+      return (a.camera_from_map.rotation * b.camera_from_map.rotation.inverse()).Angle();
+    };
+    // What the motion between the two poses before explains.
+    const double intervals = ToSeconds(now.time - last_->time) / ToSeconds(last_->time - before_last_->time);
+    const double jump = distance(now, *last_) - intervals * distance(*last_, *before_last_);
+    const double rotation_jump = rotation(now, *last_) - intervals * rotation(*last_, *before_last_);
+    if (jump > options_.max_jump * depth_ && rotation_jump <= options_.max_rotation_jump)
+      jump_ = jump / depth_;
   }
   before_last_ = last_;
   last_ = now;

@@ -30,6 +30,11 @@ struct InitializationMonitorOptions {
   // by more than a tenth of the depth from one image to the next.
   Timestamp max_gap = std::chrono::milliseconds(200);
   double max_jump = 0.05;
+  // If the viewing direction has jumped by more than this as well, in radians, the map is not to blame: false
+  // depth moves the position of a camera, but hardly its rotation. The images have a gap then, or somebody
+  // hit the camera. A hand that turns by 100 degrees a second and stops within a tenth of a second is below
+  // it.
+  double max_rotation_jump = 0.17;
 
   // Describes the first invalid option in one sentence, or empty.
   std::optional<std::string> Validate() const;
@@ -70,12 +75,12 @@ class InitializationMonitor {
   int initial_count_ = 0;
   std::vector<Sample> recent_;
   bool is_near_ = true;  // the camera is still close to its first view
-  struct Position {
+  struct Pose {
     Timestamp time{};
-    Eigen::Vector3d center_in_map = Eigen::Vector3d::Zero();
+    Rigid3 camera_from_map;
   };
   void CheckJump(const TrackedFrame& frame);
-  std::optional<Position> last_, before_last_;
+  std::optional<Pose> last_, before_last_;
   double jump_ = 0;
 };
 

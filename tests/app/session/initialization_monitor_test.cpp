@@ -89,6 +89,16 @@ TEST(InitializationMonitor, AcceptsACameraThatRelocalizesWhereItMovedTo) {
   EXPECT_FALSE(JumpAfter(0.5, 0.3)) << "it was lost for too long";
 }
 
+TEST(InitializationMonitor, DoesNotBlameTheMapWhereTheViewingDirectionJumpsAsWell) {
+  const auto turned_by = [](double radians) {
+    return [=](engine::TrackedFrame* frame) {
+      frame->camera_from_map.rotation = engine::Rotation3::Exp({0, 0, radians});
+    };
+  };
+  EXPECT_TRUE(JumpAfter(-0.5, 0.03, turned_by(0.16)));
+  EXPECT_FALSE(JumpAfter(-0.5, 0.03, turned_by(0.18)));
+}
+
 TEST(InitializationMonitor, ComparesOnlyPositionsOfOneCamera) {
   EXPECT_FALSE(JumpAfter(0.5, 0.03, [](engine::TrackedFrame* frame) { frame->frame.camera = 1; }));
   EXPECT_FALSE(JumpAfter(0.5, 0.03, [](engine::TrackedFrame* frame) { frame->finite_points = 0; }));
