@@ -30,10 +30,10 @@ struct InitializationMonitorOptions {
   // by more than a tenth of the depth from one image to the next.
   Timestamp max_gap = std::chrono::milliseconds(200);
   double max_jump = 0.05;
-  // If the viewing direction has jumped by more than this as well, in radians, the map is not to blame: false
-  // depth moves the position of a camera, but hardly its rotation. The images have a gap then, or somebody
-  // hit the camera. A hand that turns by 100 degrees a second and stops within a tenth of a second is below
-  // it.
+  // If the viewing direction has jumped by more than this as well, in radians, the jump is no evidence: false
+  // depth changes the position of a camera, but hardly its rotation. The recording has a gap then, or
+  // somebody hit the camera. A hand that turns by 100 degrees a second and stops within a tenth of a second
+  // stays below it.
   double max_rotation_jump = 0.17;
 
   // Describes the first invalid option in one sentence, or empty.

@@ -89,7 +89,7 @@ TEST(InitializationMonitor, AcceptsACameraThatRelocalizesWhereItMovedTo) {
   EXPECT_FALSE(JumpAfter(0.5, 0.3)) << "it was lost for too long";
 }
 
-TEST(InitializationMonitor, DoesNotBlameTheMapWhereTheViewingDirectionJumpsAsWell) {
+TEST(InitializationMonitor, TakesNoJumpAsEvidenceWhereTheViewingDirectionJumpsAsWell) {
   const auto turned_by = [](double radians) {
     return [=](engine::TrackedFrame* frame) {
       frame->camera_from_map.rotation = engine::Rotation3::Exp({0, 0, radians});
