@@ -110,6 +110,7 @@ std::optional<std::string> LoopCorrectionOptions::Validate() const {
       .AtLeast(edges, 1, "number of edges of a keyframe")
       .Positive(max_loop_residual, "edge residual of a loop candidate")
       .Positive(max_edge_residual, "edge residual of a pose graph")
+      .Ratio(max_exceeding_edges, "ratio of the edges with a larger residual")
       .fault();
 }
 
@@ -124,14 +125,14 @@ LoopGraph MakeLoopGraph(const LoopCorrectionOptions& options, const std::vector<
 
 bool IsConsistent(const LoopCorrectionOptions& options, const LoopGraph& optimized) {
   const std::size_t first_candidate = optimized.graph.edges.size() - optimized.candidates;
+  std::size_t exceeding = 0;
   for (std::size_t i = 0; i < optimized.graph.edges.size(); ++i) {
     const PoseGraph::Edge& edge = optimized.graph.edges[i];
-    const double left = LargestError(optimized.graph, edge);
-    if (i < first_candidate ? edge.weight * left > options.max_edge_residual
-                            : left > options.max_loop_residual)
-      return false;
+    const double left = LargestError(optimized.graph, edge) * (i < first_candidate ? edge.weight : 1);
+    if (left > options.max_loop_residual) return false;
+    if (i < first_candidate && left > options.max_edge_residual) ++exceeding;
   }
-  return true;
+  return static_cast<double>(exceeding) <= options.max_exceeding_edges * static_cast<double>(first_candidate);
 }
 
 void ApplyLoopGraph(const LoopGraph& optimized, Map* map) {

@@ -18,10 +18,15 @@ struct LoopCorrectionOptions {
   // Largest residual of a loop candidate's edge after the optimization: ratio of the median depth, radians,
   // or logarithm of the scale.
   double max_loop_residual = 0.05;
-  // Largest weighted residual of every other edge after the optimization, in the same units; the weight is 1
+  // Largest weighted residual of the other edges after the optimization, in the same units; the weight is 1
   // for keyframes that share a hundred points. A false loop between two similar places would bend the edges
   // between them by more.
   double max_edge_residual = 0.02;
+  // Ratio of these edges that may have a larger residual, up to `max_loop_residual`. Where a single edge
+  // joins two parts of the map, it takes the error alone that several parallel edges share elsewhere. In an
+  // office one of 388 to 502 edges exceeded 0.02, by at most 0.023, in 9 of 17 true loops; nine tenths of the
+  // edges stayed below 0.01. A false loop gains little, because each such edge takes 0.03 more of its error.
+  double max_exceeding_edges = 0.01;
 
   // Describes the first invalid option in one sentence, or empty.
   std::optional<std::string> Validate() const;

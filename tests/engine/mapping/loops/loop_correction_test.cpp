@@ -289,6 +289,37 @@ TEST(LoopConsistency, EndsWhereTheEdgesWouldHaveToBend) {
   }
 }
 
+// A graph of equal poses whose edges measured a displacement, followed by the edge of a loop candidate.
+LoopGraph GraphWithErrors(const std::vector<double>& errors) {
+  LoopGraph graph;
+  graph.graph.nodes.resize(2);
+  for (const double error : errors) graph.graph.edges.push_back({0, 1, Shift(error), 1});
+  graph.graph.edges.push_back({0, 1, Sim3(), 1});
+  graph.candidates = 1;
+  return graph;
+}
+
+TEST(LoopConsistency, AllowsALargerResidualInAFewOfManyEdges) {
+  const LoopCorrectionOptions options;
+  constexpr std::size_t kEdges = 300;
+  const auto allowed = static_cast<std::size_t>(options.max_exceeding_edges * kEdges);
+  ASSERT_GT(allowed, 0u);
+  const double larger = 0.5 * (options.max_edge_residual + options.max_loop_residual);
+  std::vector<double> errors(kEdges, 0.5 * options.max_edge_residual);
+  EXPECT_TRUE(IsConsistent(options, GraphWithErrors(errors)));
+  std::fill_n(errors.begin(), allowed, larger);
+  EXPECT_TRUE(IsConsistent(options, GraphWithErrors(errors)));
+  errors[allowed] = larger;
+  EXPECT_FALSE(IsConsistent(options, GraphWithErrors(errors)));
+}
+
+TEST(LoopConsistency, AllowsNoEdgeALargerResidualThanACandidate) {
+  const LoopCorrectionOptions options;
+  std::vector<double> errors(300, 0.5 * options.max_edge_residual);
+  errors[7] = 1.1 * options.max_loop_residual;
+  EXPECT_FALSE(IsConsistent(options, GraphWithErrors(errors)));
+}
+
 TEST(LoopConsistency, RefusesCandidatesThatContradictEachOther) {
   LoopCorrectionOptions options;
   options.max_edge_residual = 10;
