@@ -39,14 +39,13 @@ std::optional<Sim3> OverlapVerification::Verify(KeyFrameId id, const Sim3& a_fro
   const std::vector<MapPointId> points = PointsInView(At(id), others, camera_from_other);
   if (points.empty()) return std::nullopt;
   ++evidence->with_view;
-  evidence->found_ratios.push_back(0);
   auto candidate =
       VerifyLoopCandidate(options_.search.verification, id, others, camera_from_other, map_, &searcher_);
   if (!candidate) return std::nullopt;
   const Sim3 implied = KnownFromRecent(*candidate, map_);
   if (MagnitudeAt(other_from_own.inverse() * implied, At(id)).largest() > options_.max_disagreement)
     return std::nullopt;
-  evidence->found_ratios.back() = static_cast<double>(candidate->seen.size()) / candidate->expected;
+  evidence->found_ratios.push_back(static_cast<double>(candidate->seen.size()) / candidate->expected);
   CompareSurfaces(*candidate, points, evidence);
   evidence->candidates.push_back(std::move(*candidate));
   return keyframes_.IsOfA(id) ? implied.inverse() : implied;

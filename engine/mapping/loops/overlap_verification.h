@@ -14,11 +14,11 @@ struct OverlapEvidence {
   Sim3 a_from_b;
   std::size_t consecutive = 0, with_view = 0;
   std::vector<LoopCandidate> candidates;
-  std::vector<double> found_ratios;  // of the keyframes with a view, 0 where they do not confirm it
+  std::vector<double> found_ratios;  // of the candidates: points found, of those expected
   std::size_t regions = 0, contradicted = 0;
 
   std::size_t Points() const;
-  double MedianFoundRatio() const;  // 0 without keyframes with a view
+  double MedianFoundRatio() const;  // 0 without candidates
 };
 
 // The localized keyframes of both maps, in order of creation.

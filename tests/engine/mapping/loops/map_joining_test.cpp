@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <atomic>
+#include <map>
 #include <sstream>
 #include <string>
 #include <vector>
@@ -137,6 +138,25 @@ TEST(MapJoining, IsDeterministic) {
   ASSERT_EQ(first.points.size(), second.points.size());
   for (std::size_t i = 0; i < first.points.size(); ++i)
     EXPECT_EQ(first.points[i].point_in_map, second.points[i].point_in_map);
+}
+
+// Drift has displaced a part of one map, so that its keyframes do not confirm the similarity of the others.
+TEST(MapJoining, JoinsMapsOfWhichOneHasDrifted) {
+  Map drifted = testing_world::MapOfGallery(VariedGallery(), AlongTheGallery(2.1, 6, 0.2, 0.1));
+  std::map<KeyFrameId, Sim3> moved;
+  for (const auto& [id, record] : drifted.keyframes()) {
+    const double x = record.keyframe.camera_from_map.OriginInSource().x();
+    if (x > 2.8) moved[id] = {Rotation3(), {0, 0.4, 0}, 1};
+  }
+  drifted.Correct(moved);
+  testing_world::Transform(kOther, &drifted);
+  const auto snapshot = drifted.Snapshot();
+  const MapJoinAttempt attempt = JoinMaps({}, *OverlappingPair().a, *snapshot, nullptr);
+  EXPECT_EQ(attempt.overlap.outcome, OverlapOutcome::kOverlap) << Brief(attempt.overlap);
+  MapJoiningOptions strict;
+  strict.overlap.min_confirmed_ratio = 0.8;
+  const MapJoinAttempt refused = JoinMaps(strict, *OverlappingPair().a, *snapshot, nullptr);
+  EXPECT_EQ(refused.overlap.outcome, OverlapOutcome::kContradicted) << Brief(refused.overlap);
 }
 
 TEST(MapJoining, RejectsMapsOfDifferentPlaces) {
