@@ -34,7 +34,7 @@ target_compile_options(docent_compile_options INTERFACE -Wall -Wextra -Wpedantic
   $<$<AND:$<CXX_COMPILER_ID:GNU>,$<STREQUAL:${CMAKE_CXX_FLAGS_RELEASE},-O3>>:-Wno-restrict>
   $<$<AND:$<CXX_COMPILER_ID:GNU>,$<BOOL:${DOCENT_PRECOMPILE}>>:-fpch-preprocess>
   $<$<BOOL:${DOCENT_WERROR}>:-Werror>
-  # Else it is the optimiser's choice which products are rounded before they are added, and a change of one line
+  # Else it is the optimizer's choice which products are rounded before they are added, and a change of one line
   # changes the figures of another. It costs nothing that can be measured.
   -ffp-contract=off
   # GCC 12 does not keep to it where it gathers single statements into vectors: a difference beside a sum becomes

@@ -230,7 +230,7 @@ inline constexpr const char* kCoverage = "Coverage";
 inline constexpr const char* kBoundary = "Boundary";
 inline constexpr const char* kBoundaryHelp = "The edges of the box within which a bounded map is extended.";
 inline constexpr const char* kCoverageHelp =
-    "A small map: visitors will be recognised where it is green; take more images where it is red.";
+    "A small map: visitors will be recognized where it is green; take more images where it is red.";
 inline constexpr const char* kFullScreen = "Full screen";
 inline constexpr const char* kKeys = "Keys";
 

@@ -11,7 +11,7 @@ namespace docent::app {
 // A file, because every user of the machine can read a command line. Throws Error.
 std::string ReadKioskCode(const std::filesystem::path& file);
 
-// Recognises the code among keys that are pressed one after another. One thread.
+// Recognizes the code among keys that are pressed one after another. One thread.
 class KioskLock {
  public:
   using Clock = std::chrono::steady_clock;

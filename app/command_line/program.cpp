@@ -111,7 +111,7 @@ CLI::App* AddSubcommand(CLI::App* parent, const std::string& name, const std::st
 
 int RunProgram(int argc, const char* const* argv) {
   CLI::App program(
-      "Docent, an augmented-reality guide: it builds maps, recognises them later, and shows the models and "
+      "Docent, an augmented-reality guide: it builds maps, recognizes them later, and shows the models and "
       "signposts placed in them.",
       "docent");
   program.footer(ProgramFooter());

@@ -91,8 +91,8 @@ void AddEngineOption(CLI::App* command, EngineKind* engine) {
 void AddWhenLostOption(CLI::App* command, std::optional<WhenLost>* when_lost, const std::string& otherwise) {
   AddChoice<WhenLost>(
       command, "--when-lost", when_lost,
-      "What to do when tracking is lost and no map is recognised: start a new map, which is joined with a "
-      "known map where they overlap, or wait until a map is recognised (default: " +
+      "What to do when tracking is lost and no map is recognized: start a new map, which is joined with a "
+      "known map where they overlap, or wait until a map is recognized (default: " +
           otherwise + ")",
       {{"new", WhenLost::kNew}, {"wait", WhenLost::kWait}});
 }

@@ -151,7 +151,7 @@ void PrintSummary(const DrawingCheck& check, std::size_t maps, const fs::path& f
     return check.visit_frames() > 0 ? 100.0 * frames / check.visit_frames() : 0.0;
   };
   std::printf("%zu maps were built and content was placed in them.\n", maps);
-  std::printf("The right bay was recognised in %.0f %% of %d images, a wrong one in %.0f %%.\n",
+  std::printf("The right bay was recognized in %.0f %% of %d images, a wrong one in %.0f %%.\n",
               percent(check.recognized_correctly()), check.visit_frames(),
               percent(check.recognized() - check.recognized_correctly()));
   if (!check.errors_px().empty()) {

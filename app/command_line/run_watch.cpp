@@ -31,7 +31,7 @@ void RunWatch::WatchPair(std::size_t camera, const engine::TrackedFrame& tracked
   if (!pair_.Update(camera, ToSeconds(tracked.frame.time), engine::HasPose(tracked.state))) return;
   notices->events.push_back({tracked.frame.time, "warning",
                              "Camera '" + cameras_[camera] +
-                                 "' has not been recognised for half a minute where the other camera is; are "
+                                 "' has not been recognized for half a minute where the other camera is; are "
                                  "both worn together?"});
   notices->sentence = strings_.cameras_apart;
 }

@@ -54,10 +54,10 @@ std::string ReasonOf(const engine::MapOverlap& overlap) {
       break;
     case Outcome::kNothingToCompare:
       return "one of the maps has too few localized keyframes to be compared";
-    case Outcome::kNothingRecognised:
-      return "no place of one map is recognised in the other";
+    case Outcome::kNothingRecognized:
+      return "no place of one map is recognized in the other";
     case Outcome::kTooFewConsecutive:
-      return Printed("only %zu consecutive keyframes are recognised at the same place", overlap.consecutive);
+      return Printed("only %zu consecutive keyframes are recognized at the same place", overlap.consecutive);
     case Outcome::kContradicted:
       return TextOfContradiction(overlap);
     case Outcome::kAmbiguous:
@@ -183,10 +183,10 @@ std::string TextOf(const engine::RigEstimate& rig) {
 
 std::string TextOf(const engine::MapOverlap& overlap) {
   return Printed(
-      "%zu keyframes recognised, %zu consecutive, %zu of %zu with a view of the other map confirm it, median "
+      "%zu keyframes recognized, %zu consecutive, %zu of %zu with a view of the other map confirm it, median "
       "ratio of points found %.2f, %zu of %zu regions contradict, %zu points in total, %zu for another "
       "hypothesis, scale %.4g",
-      overlap.recognised, overlap.consecutive, overlap.confirmed, overlap.with_view, overlap.found_ratio,
+      overlap.recognized, overlap.consecutive, overlap.confirmed, overlap.with_view, overlap.found_ratio,
       overlap.contradicted, overlap.regions, overlap.points, overlap.second_points, overlap.a_from_b.scale);
 }
 

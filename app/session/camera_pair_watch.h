@@ -7,7 +7,7 @@
 
 namespace docent::app {
 
-// Notices that one of two cameras is not recognised where the other one is, as when they are not worn
+// Notices that one of two cameras is not recognized where the other one is, as when they are not worn
 // together. Times are seconds of one clock. One thread.
 class CameraPairWatch {
  public:

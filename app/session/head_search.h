@@ -23,18 +23,18 @@ std::optional<Eigen::Vector3d> GazePoint(const engine::MapSnapshot& map,
 struct HeadSearchOptions {
   double yaw_sigma_rad = 0.5;    // of the carrier's unknown rotation about the vertical since the loss
   double uniform_weight = 0.15;  // weight of a uniform distribution over that rotation
-  // A view is recognised from another one with a probability that falls with the rotation and the distance
+  // A view is recognized from another one with a probability that falls with the rotation and the distance
   // between them (ratio of the median depth), as Gaussians of these sigmas.
   double view_rotation_sigma_rad = 0.4;
   double view_shift_sigma = 0.4;
   int sufficient_points = 60;    // points in view; fewer reduce the probability proportionally
-  double max_probability = 0.5;  // of recognising one image in the best direction
+  double max_probability = 0.5;  // of recognizing one image in the best direction
   double dwell_s = 0.3;          // time for a view in addition to the travel time
 };
 
-// The probability that an image in a direction is recognised, and the search that follows from it. The search
+// The probability that an image in a direction is recognized, and the search that follows from it. The search
 // keeps a distribution over the carrier's rotation since its last pose and lowers it wherever an image was
-// not recognised (Stone, Theory of Optimal Search, 1975). The next direction is the one with the highest
+// not recognized (Stone, Theory of Optimal Search, 1975). The next direction is the one with the highest
 // probability of recognition per second.
 class HeadSearch {
  public:
@@ -42,11 +42,11 @@ class HeadSearch {
   HeadSearch(const PanTiltRange& range, const engine::CameraModel& camera, const engine::MapSnapshot& map,
              const engine::Rigid3& carrier_from_map, const HeadSearchOptions& options = {});
 
-  // Probability that one image is recognised if the carrier has not rotated; [0, 1].
+  // Probability that one image is recognized if the carrier has not rotated; [0, 1].
   double RecognitionProbability(const PanTilt& at) const;
   // The direction with the highest such probability, which also keeps the map in view.
   PanTilt Best() const;
-  // Updates the distribution after an image taken there was not recognised.
+  // Updates the distribution after an image taken there was not recognized.
   void AddEmptyView(const PanTilt& at);
   // The next direction to look at.
   PanTilt Next(const PanTilt& at) const;
@@ -56,7 +56,7 @@ class HeadSearch {
   std::size_t Row(double tilt_rad) const;
   static std::size_t Column(double yaw_rad);
   double ProbabilityAt(double yaw_rad, double tilt_rad) const;
-  // Probability of recognising an image in every direction, averaged over the carrier's rotation; indexed
+  // Probability of recognizing an image in every direction, averaged over the carrier's rotation; indexed
   // like probabilities_.
   std::vector<double> ExpectedProbabilities() const;
 

@@ -9,7 +9,7 @@ namespace docent::app {
 
 namespace {
 
-// Design choices, in seconds. A sentence flickers while a camera is nearly recognised; a way turns with the
+// Design choices, in seconds. A sentence flickers while a camera is nearly recognized; a way turns with the
 // head.
 constexpr double kSentenceStays = 1, kSentenceAgain = 15, kWayStays = 2, kWayAgain = 20, kSignStays = 1.5;
 // A letter is legible from an angle of 0.3 to 0.4 degrees on (ISO 9241-303 recommends 20 to 22 minutes of

@@ -28,7 +28,7 @@ std::string TextOf(const RejectionMessage& rejection, const VisitorStrings& stri
     case engine::RejectionReason::kNone:
       break;
     case engine::RejectionReason::kFewPoints:
-      return strings.not_recognised;
+      return strings.not_recognized;
     case engine::RejectionReason::kPoorFit:
     case engine::RejectionReason::kContradicted:
       return Filled(strings, strings.resembles, {rejection.map});

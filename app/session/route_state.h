@@ -29,7 +29,7 @@ struct Route {
 // What happened on a tour.
 struct RouteEvent {
   enum class Kind {
-    kArrived,    // The visitor was recognised at the stop.
+    kArrived,    // The visitor was recognized at the stop.
     kSkipped,    // The visitor passes over the stop.
     kGoingBack,  // The visitor asked to be led back to the stop,
     kGoingOn,    // or, on the way back, to be led on to the stop.

@@ -92,7 +92,7 @@ class Session {
     std::optional<MappingStatus> mapping;                 // only where the session may write
     std::string advice;                                   // a sentence about the frame's camera; often empty
     std::string hint;  // what to do so that the camera is tracked, as one sentence in English; often empty
-    RejectionMessage rejection;  // why a lost camera is not recognised, which `hint` says then
+    RejectionMessage rejection;  // why a lost camera is not recognized, which `hint` says then
     std::optional<maps::Bounds>
         bounds;                // outside of which the map is not extended; empty where there are none
     std::string starting_map;  // the map that is being initialized; empty once it has points, and for none

@@ -54,7 +54,7 @@ ui::VisitorDisplay VisitState::Search(double seconds, const std::string& hint) c
   if (searched >= times_.stops) {
     display.stops = stops_;
     display.sentence = strings_.go_to_a_place;
-  } else if (Welcomes(seconds) && hint == strings_.not_recognised) {
+  } else if (Welcomes(seconds) && hint == strings_.not_recognized) {
     display.sentence = strings_.welcome;
   } else if (!hint.empty()) {
     display.sentence = hint;

@@ -14,18 +14,18 @@ namespace docent::app {
 struct VisitTimes {
   double arrival = 2.5;  // A place is announced for this long, enough to read two short words twice.
   double fade = 0.4;     // The announcement appears and disappears within this time.
-  // Who is not recognised within this time is shown the entrances of the likeliest places: most are
-  // recognised sooner.
+  // Who is not recognized within this time is shown the entrances of the likeliest places: most are
+  // recognized sooner.
   double entrances = 1.5;
-  // The welcome stays for this long, enough to read it; that nothing is recognised yet is not said before.
+  // The welcome stays for this long, enough to read it; that nothing is recognized yet is not said before.
   double welcome = 4;
   double held = 0.5;    // After a loss the content stays where it was for this long: a hand that passes.
   double way_back = 5;  // Searching longer than this, the visitor is led to known views,
   double stops = 30;    // and longer than this, all places are listed.
 };
 
-// What a visitor on a tour is told, by what was recognised so far: a welcome, where they are, or how to be
-// recognised again. One camera; times are those of its images and do not decrease. One thread.
+// What a visitor on a tour is told, by what was recognized so far: a welcome, where they are, or how to be
+// recognized again. One camera; times are those of its images and do not decrease. One thread.
 class VisitState {
  public:
   // `stops`: the names of the places of the library. `strings` is one of the constants behind
@@ -40,7 +40,7 @@ class VisitState {
   // Whether a visitor who searches at this time is helped by views of known places, as the display should
   // have them: after a while, and until all places are listed.
   bool WantsViews(double seconds) const;
-  // Whether a visitor who was not recognised yet is helped by the entrances of places at this time.
+  // Whether a visitor who was not recognized yet is helped by the entrances of places at this time.
   bool WantsEntrances(double seconds) const;
 
   // Whether a visitor is still to read the welcome.

@@ -12,8 +12,8 @@ void VisitorGuide::Guide(const std::shared_ptr<ShownFrame>& frame, const engine:
   frame->visitor = state_.Update(frame->seconds, has_pose ? frame->shown.map_name : std::string(), hint);
   FindViews(*frame);
   frame->visitor->views = views_;
-  // Who is nearly recognised is not to go elsewhere.
-  const bool says_little = hint.empty() || hint == strings_.not_recognised;
+  // Who is nearly recognized is not to go elsewhere.
+  const bool says_little = hint.empty() || hint == strings_.not_recognized;
   if (!views_.empty() && says_little && !state_.Welcomes(frame->seconds))
     frame->visitor->sentence = strings_.go_to_a_view;
   if (route_ != nullptr) FollowRoute(has_pose, frame.get());

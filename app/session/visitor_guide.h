@@ -54,7 +54,7 @@ class VisitorGuide {
   std::shared_ptr<const ShownFrame> last_with_pose_;
 };
 
-// What a visitor is told about a frame so that the camera is tracked: why its place is not recognised, else
+// What a visitor is told about a frame so that the camera is tracked: why its place is not recognized, else
 // the engine's hint. Empty for nothing, and for hints that are about building a map.
 std::string VisitorHint(const RejectionMessage& rejection, engine::Hint hint, const VisitorStrings& strings);
 

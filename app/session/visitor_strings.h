@@ -21,8 +21,8 @@ struct VisitorStrings {
   const char* go_to_a_place;
   const char* go_to_a_view;
 
-  // What keeps a camera from being recognised or followed.
-  const char* not_recognised;
+  // What keeps a camera from being recognized or followed.
+  const char* not_recognized;
   const char* resembles;      // Place.
   const char* only_a_corner;  // Place.
   const char* either_of_two;  // Place.

@@ -48,7 +48,7 @@ struct VisitRecord {
   bool operator==(const VisitRecord&) const = default;
 };
 
-// Makes the records of one camera's visits from its images. A visit ends when nothing is recognised for two
+// Makes the records of one camera's visits from its images. A visit ends when nothing is recognized for two
 // minutes; the next one begins with the next pose. One thread.
 class VisitRecorder {
  public:

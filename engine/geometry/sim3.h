@@ -29,7 +29,7 @@ inline Sim3 AsSim3(const Rigid3& rigid) {
   return {rigid.rotation, rigid.translation, 1.0};
 }
 
-// The similarity a_from_b that minimises sum |a_i - a_from_b * b_i|^2 (Umeyama 1991). Empty for fewer than
+// The similarity a_from_b that minimizes sum |a_i - a_from_b * b_i|^2 (Umeyama 1991). Empty for fewer than
 // three points and for collinear points. With fixed_scale the scale stays 1.
 std::optional<Sim3> AlignSim3(std::span<const Eigen::Vector3d> points_in_a,
                               std::span<const Eigen::Vector3d> points_in_b, bool fixed_scale = false);

@@ -11,7 +11,7 @@
 namespace docent::engine {
 
 // The point seen along ray_a and ray_b (unit vectors in the frames of two cameras), in frame a, map units.
-// Minimises the angular errors to first order (midpoint weighted by inverse squared depth). Empty if the rays
+// Minimizes the angular errors to first order (midpoint weighted by inverse squared depth). Empty if the rays
 // intersect behind a camera or are parallel to within 1e-9 rad.
 std::optional<Eigen::Vector3d> Triangulate(const Eigen::Vector3d& ray_in_a, const Eigen::Vector3d& ray_in_b,
                                            const Rigid3& b_from_a);

@@ -25,7 +25,7 @@ struct PlanarTargetOptions {
   int min_matches = 7;             // that agree with a pose, before alignment is tried
   double consensus_px = 4;         // RANSAC; corners of coarse levels are off by this much
   int max_points_per_stage = 120;  // points aligned per pyramid level, at most
-  float min_correlation = 0.75f;   // of an aligned patch, normalised
+  float min_correlation = 0.75f;   // of an aligned patch, normalized
   double aligned_px = 2.0;         // residual below which an aligned point is an inlier, level 0
   int min_inliers = 20;            // of aligned points
   double min_inlier_ratio = 0.4;   // of the points that project into the frame

@@ -103,7 +103,7 @@ Consensus Evaluate(const Eigen::Matrix3d& model, Eigen::ArrayXd squared_px, doub
 }
 
 template <class Kind>
-void OptimiseLocally(const RayPairs& pairs, double inlier_px, Consensus* best) {
+void OptimizeLocally(const RayPairs& pairs, double inlier_px, Consensus* best) {
   for (int round = 0; round < kLocalRounds; ++round) {
     if (best->inliers < Kind::kSampleSize + 1) return;
     const Weights weights = (best->squared_px < inlier_px * inlier_px).template cast<double>();
@@ -116,7 +116,7 @@ void OptimiseLocally(const RayPairs& pairs, double inlier_px, Consensus* best) {
 
 // The number of samples until one without outliers is among them with this confidence.
 int IterationsNeeded(int inliers, Eigen::Index total, int sample_size, double confidence) {
-  // Avoids std::pow: an optimiser replaces it for some exponents, which changes the rounding.
+  // Avoids std::pow: an optimizer replaces it for some exponents, which changes the rounding.
   double clean = 1;
   for (int i = 0; i < sample_size; ++i) clean *= static_cast<double>(inliers) / static_cast<double>(total);
   if (clean >= 1) return 1;
@@ -155,7 +155,7 @@ Consensus FindConsensus(const RayPairs& pairs, const ConsensusOptions& options) 
       if (candidate.cost < best_of_sample.cost) best_of_sample = std::move(candidate);
     }
     if (!(best_of_sample.cost < best.cost)) continue;
-    OptimiseLocally<Kind>(pairs, options.inlier_px, &best_of_sample);
+    OptimizeLocally<Kind>(pairs, options.inlier_px, &best_of_sample);
     best = std::move(best_of_sample);
     needed = std::min(needed, iterations_for(best.inliers));
   }
@@ -189,7 +189,7 @@ void OfferPose(const RayPairs& pairs, const ConsensusOptions& options, const Rig
                Consensus* best) {
   const Eigen::Matrix3d model = EssentialFromPose(b_from_a);
   Consensus offered = Evaluate(model, EssentialResiduals(pairs, model), options.inlier_px);
-  OptimiseLocally<EssentialKind>(pairs, options.inlier_px, &offered);
+  OptimizeLocally<EssentialKind>(pairs, options.inlier_px, &offered);
   if (!best->found || offered.cost < best->cost) *best = std::move(offered);
 }
 

@@ -9,7 +9,7 @@
 #include "engine/initialization/two_view_models.h"
 
 // Robust estimation of one two-view model from ray pairs with outliers: random sampling with a truncated
-// quadratic score (MSAC, Torr and Zisserman 2000) and local optimisation of every new best model (LO-RANSAC,
+// quadratic score (MSAC, Torr and Zisserman 2000) and local optimization of every new best model (LO-RANSAC,
 // Chum, Matas and Kittler 2003). Deterministic under the seed; any thread.
 namespace docent::engine {
 
@@ -39,7 +39,7 @@ Consensus FindRotation(const RayPairs& pairs, const ConsensusOptions& options);
 Consensus FindHomography(const RayPairs& pairs, const ConsensusOptions& options);
 Consensus FindEssential(const RayPairs& pairs, const ConsensusOptions& options);
 
-// Optimises a pose locally and replaces *best if its cost is lower.
+// Optimizes a pose locally and replaces *best if its cost is lower.
 void OfferPose(const RayPairs& pairs, const ConsensusOptions& options, const Rigid3& b_from_a,
                Consensus* best);
 

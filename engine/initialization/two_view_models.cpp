@@ -56,7 +56,7 @@ struct NormalEquations {
 // Levenberg-Marquardt for any model: linearize(model) returns NormalEquations, cost(model) the loss, and
 // apply(model, step) the model after the step.
 template <class Model, class Linearize, class Cost, class Apply>
-Model Minimise(const Model& start, int max_iterations, const Linearize& linearize, const Cost& cost,
+Model Minimize(const Model& start, int max_iterations, const Linearize& linearize, const Cost& cost,
                const Apply& apply) {
   Model best = start;
   double best_cost = cost(start);
@@ -178,7 +178,7 @@ Eigen::ArrayXd RotationResiduals(const RayPairs& pairs, const Eigen::Matrix3d& b
 
 Rigid3 RefinePose(const RayPairs& pairs, const Weights& weights, const Rigid3& start, double huber_px,
                   int max_iterations) {
-  return Minimise(
+  return Minimize(
       start, max_iterations,
       [&](const Rigid3& pose) { return LinearizePose(pairs, weights, pose, huber_px); },
       [&](const Rigid3& pose) {
@@ -194,7 +194,7 @@ Rigid3 RefinePose(const RayPairs& pairs, const Weights& weights, const Rigid3& s
 Eigen::Matrix3d RefineHomography(const RayPairs& pairs, const Weights& weights, const Eigen::Matrix3d& start,
                                  double huber_px, int max_iterations) {
   const Eigen::Matrix3d unit = start * (std::sqrt(3.0) / start.norm());
-  return Minimise(
+  return Minimize(
       unit, max_iterations,
       [&](const Eigen::Matrix3d& homography) {
         return LinearizeHomography(pairs, weights, homography, huber_px);

@@ -40,7 +40,7 @@ Rigid3 RefinePose(const RayPairs& pairs, const Weights& weights, const Rigid3& s
 // The same on the transfer residuals of a homography; the result has Frobenius norm sqrt(3).
 Eigen::Matrix3d RefineHomography(const RayPairs& pairs, const Weights& weights, const Eigen::Matrix3d& start,
                                  double huber_px, int max_iterations);
-// The rotation that minimises the weighted sum of |b - R a|^2, in closed form (Kabsch 1976).
+// The rotation that minimizes the weighted sum of |b - R a|^2, in closed form (Kabsch 1976).
 Eigen::Matrix3d FitRotation(const RayPairs& pairs, const Weights& weights);
 
 }  // namespace docent::engine

@@ -14,7 +14,7 @@
 namespace docent::engine {
 namespace {
 
-// Truncation of the squared normalised residuals of poses: two standard deviations.
+// Truncation of the squared normalized residuals of poses: two standard deviations.
 constexpr double kMaxSquared = 4.0;
 
 // A pair has two constraints instead of one: factor to the radius that contains the same share of a normal
@@ -49,8 +49,8 @@ double Gric(const Consensus& consensus, const Weights& counted, double noise_px,
   if (!consensus.found) return std::numeric_limits<double>::infinity();
   const double count = counted.sum();
   const double limit = kTruncation * (kDataDimension - dimension);
-  const Eigen::ArrayXd normalised = consensus.squared_px / (noise_px * noise_px);
-  const double cost = (counted * (normalised < limit).select(normalised, limit)).sum();
+  const Eigen::ArrayXd normalized = consensus.squared_px / (noise_px * noise_px);
+  const double cost = (counted * (normalized < limit).select(normalized, limit)).sum();
   return cost + std::log(kDataDimension) * dimension * count + std::log(kDataDimension * count) * parameters;
 }
 

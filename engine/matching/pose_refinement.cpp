@@ -33,7 +33,7 @@ Projection ProjectMeasurement(const CameraModel& camera, const Eigen::Matrix3d& 
   return projection;
 }
 
-// d normalised pixel / d twist. pivot: centre of the three rotational degrees of freedom, camera frame.
+// d normalized pixel / d twist. pivot: centre of the three rotational degrees of freedom, camera frame.
 Matrix26 PoseJacobian(const Projection& projection, const PoseMeasurement& measurement,
                       const Eigen::Vector3d& pivot) {
   const double w = measurement.point_in_map[3];
@@ -65,7 +65,7 @@ double RobustSigma(std::vector<double>* squared_errors) {
 
 // Scale of the residuals of one kind of points, finite or infinite, in one iteration.
 struct RobustScale {
-  double sigma = 0;      // robust, of the normalised residuals
+  double sigma = 0;      // robust, of the normalized residuals
   double threshold = 0;  // threshold of the loss
 };
 

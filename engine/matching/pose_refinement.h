@@ -33,7 +33,7 @@ struct PredictedPosition {
 struct PoseRefinementOptions {
   int iterations = 10;          // ptamm §2.1: ten are adequate
   double tukey_factor = 4.685;  // times the robust sigma: 95 % efficiency under Gaussian noise
-  // Lower bound of the normalised residuals' sigma: a smaller value is more optimistic than the noise model.
+  // Lower bound of the normalized residuals' sigma: a smaller value is more optimistic than the noise model.
   double min_sigma = 0.5;
   double min_weight = 1e-3;       // A measurement with a smaller weight is an outlier.
   double infinite_weight = 0.01;  // weight of an infinite point when there are finite ones (hybrid-slam §3.1)
@@ -72,7 +72,7 @@ struct PoseRefinement {
   // The pose without the rotation prior; set unless the rotation alone was estimated.
   Rigid3 camera_from_map_without_prior;
   ObservedMotion observed = ObservedMotion::kSixDof;
-  double sigma = 0;  // robust, of the normalised residuals
+  double sigma = 0;  // robust, of the normalized residuals
   int inliers = 0;
   int finite_inliers = 0;    // contained in `inliers`
   double mean_depth = 0;     // map units, of the finite inliers; 0 if there are none
@@ -97,8 +97,8 @@ struct MotionPrior {
 struct PoseRefinementMemory {
   struct Projection {
     Eigen::Vector3d point_in_camera;       // homogeneous like the measurement
-    Eigen::Vector2d error;                 // normalised by the sigma of the level
-    Eigen::Matrix<double, 2, 3> jacobian;  // d normalised pixel / d point_in_camera
+    Eigen::Vector2d error;                 // normalized by the sigma of the level
+    Eigen::Matrix<double, 2, 3> jacobian;  // d normalized pixel / d point_in_camera
     bool valid = false;
   };
   std::vector<Projection> projections;  // one per measurement

@@ -183,7 +183,7 @@ Support EvaluateSupport(const Correspondences& all, const Rigid3& pose, double i
   return support;
 }
 
-Support OptimiseLocally(const Correspondences& all, Support best, double inlier_px, int rounds) {
+Support OptimizeLocally(const Correspondences& all, Support best, double inlier_px, int rounds) {
   for (int round = 0; round < rounds && best.inliers >= 4; ++round) {
     const Rigid3 pose =
         RefineAbsolutePose(all.rays, all.points, best.inlier, best.pose, all.pixel_angle, inlier_px / 2, 5);
@@ -224,7 +224,7 @@ Support FindSupport(const Correspondences& all, const AbsolutePoseOptions& optio
       if (support.cost < best_of_sample.cost) best_of_sample = std::move(support);
     }
     if (!(best_of_sample.cost < best.cost)) continue;
-    best = OptimiseLocally(all, std::move(best_of_sample), options.inlier_px, 2);
+    best = OptimizeLocally(all, std::move(best_of_sample), options.inlier_px, 2);
     needed = std::min(
         needed, std::max(kMinIterations,
                          IterationsNeeded(best.inliers, total, options.confidence, options.max_iterations)));
@@ -348,7 +348,7 @@ std::optional<AbsolutePose> EstimateAbsolutePose(std::span<const Eigen::Vector3d
        static_cast<int>(std::ceil(options.min_inlier_ratio * static_cast<double>(all.rays.size())))});
   if (static_cast<int>(all.rays.size()) < min_inliers) return std::nullopt;
   constexpr int kFinalRounds = 5;
-  const Support best = OptimiseLocally(all, FindSupport(all, options), options.inlier_px, kFinalRounds);
+  const Support best = OptimizeLocally(all, FindSupport(all, options), options.inlier_px, kFinalRounds);
   if (best.inliers < min_inliers) return std::nullopt;
 
   AbsolutePose result;

@@ -41,7 +41,7 @@ struct AbsolutePose {
 std::vector<Rigid3> SolveThreePoints(std::span<const Eigen::Vector3d, 3> rays_in_camera,
                                      std::span<const Eigen::Vector3d, 3> points_in_map);
 
-// RANSAC over three points with local optimisation, then RefineAbsolutePose. rays_in_camera: unit rays; other
+// RANSAC over three points with local optimization, then RefineAbsolutePose. rays_in_camera: unit rays; other
 // or non-finite entries are ignored. Empty if no pose has min_inliers inliers (and min_inlier_ratio of the
 // correspondences that are not ignored).
 std::optional<AbsolutePose> EstimateAbsolutePose(std::span<const Eigen::Vector3d> rays_in_camera,

@@ -97,7 +97,7 @@ void MapPolicy::CheckProvisionalMap(const SystemCamera& camera, const TrackedFra
   if (reason) Discard(map.key, frame.frame.time, *reason);
 }
 
-// Starts a new map for a camera that is lost and recognises no map.
+// Starts a new map for a camera that is lost and recognizes no map.
 void MapPolicy::CheckLoss(std::size_t index, const TrackedFrame& frame) {
   const MapAssignment& assignment = state_.cameras[index].assignment;
   if (!options_.extend_maps || !options_.new_map_when_lost || state_.association.AnyTracked()) return;
@@ -107,7 +107,7 @@ void MapPolicy::CheckLoss(std::size_t index, const TrackedFrame& frame) {
       state_.active_key != found->first)
     return;
   const Timestamp now = frame.frame.time;
-  // A place that the camera leaves into what is not mapped will not be recognised by waiting.
+  // A place that the camera leaves into what is not mapped will not be recognized by waiting.
   if (!frame.left_map && !assignment.IsLostFor(options_.lost_time_before_new_map, now)) return;
   if (frame.relocalization.rejection == RejectionReason::kUnconfirmed) return;  // relocalization is imminent
   const std::uint64_t lost_in = found->first;

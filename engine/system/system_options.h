@@ -23,7 +23,7 @@ struct SystemOptions {
   bool extend_maps = true;  // false: known maps are tracked and never changed
   std::uint64_t seed = 1;   // of the random choices of robust estimation; equal seeds give equal runs
   ProvisionalMapOptions provisional;  // when a new map is confirmed, or discarded and started again
-  // Whether a camera that is lost for `lost_time_before_new_map`, and recognises no map, starts a new map.
+  // Whether a camera that is lost for `lost_time_before_new_map`, and recognizes no map, starts a new map.
   bool new_map_when_lost = false;
   Timestamp lost_time_before_new_map = std::chrono::milliseconds(200);  // image time
   // Gives the key of a map that the system starts by itself, after a discarded one or a loss; 0 when there is

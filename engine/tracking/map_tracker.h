@@ -58,7 +58,7 @@ struct MapTrackResult {
   // Ratio of the cells of a 4x3 image grid that hold enough inliers, of finite points and of all points
   // (hybrid-slam §4.1).
   double finite_coverage = 0, coverage = 0;
-  double sigma = 0;  // robust, of the normalised residuals
+  double sigma = 0;  // robust, of the normalized residuals
   // Cells of a 4x4 image grid with an inlier; measures how well the inliers are spread.
   int occupied_cells = 0;
   // Of the points that were searched: the ratio of those in parts of the image where hardly any was an

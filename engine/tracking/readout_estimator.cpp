@@ -15,7 +15,7 @@ using Matrix8 = Eigen::Matrix<double, 8, 8>;
 using Vector8 = Eigen::Matrix<double, 8, 1>;
 
 // What one frame says: normal equations of the readout time with the pose eliminated. Residuals are
-// normalised.
+// normalized.
 struct FrameEquations {
   Eigen::Matrix2d information = Eigen::Matrix2d::Zero();
   Eigen::Vector2d gradient = Eigen::Vector2d::Zero();

@@ -42,7 +42,7 @@ class ReadoutEstimator {
   explicit ReadoutEstimator(const ReadoutOptions& options);
 
   // A frame that was tracked with `camera`, which has the rotation rate of the frame. measurements: with the
-  // weights of the pose. sigma: robust, of the normalised residuals. frame_s: time since the previous frame;
+  // weights of the pose. sigma: robust, of the normalized residuals. frame_s: time since the previous frame;
   // no readout takes longer.
   void Add(const CameraModel& camera, const Rigid3& camera_from_map,
            std::span<const PoseMeasurement> measurements, double sigma, double frame_s);

@@ -57,7 +57,7 @@ struct TrackerOptions {
   double min_consensus_ratio = 0.6;  // inliers over points found
   double max_consensus_sigma = 2.0;
   int min_cells = 3;  // cells of the 4x4 image grid with an inlier
-  // Largest robust sigma of the normalised residuals: where nothing fits, the robust threshold grows until
+  // Largest robust sigma of the normalized residuals: where nothing fits, the robust threshold grows until
   // chance matches pass it. A true pose has a sigma below 1.
   double max_sigma = 4.0;
   // The same for a pure rotation in a map with finite points: true rotations have less than half of it. If it

@@ -21,7 +21,7 @@ constexpr int kSmoothed = kWindow - 2;
 constexpr int kRotatedWidth = kPatchWidth + 2;  // with a border for the gradients
 constexpr int kLanes = 16;                      // a row of the patch, padded to the vector width
 constexpr float kMaxValue = 0.3f;      // of the unit vector; limits the influence of a single strong edge
-constexpr float kMinStrength = 60.0f;  // norm before normalisation: about twice that of sensor noise
+constexpr float kMinStrength = 60.0f;  // norm before normalization: about twice that of sensor noise
 constexpr int kDirectionBins = 36;
 constexpr float kSecondPeak = 0.8f;  // ratio of the strongest peak (Lowe 2004)
 
@@ -181,7 +181,7 @@ int DominantDirections(const DirectionHistogram& histogram, std::array<float, kM
 }
 
 // False if there is too little texture.
-bool Normalise(std::array<float, kDescriptorSize>* values, Descriptor* descriptor) {
+bool Normalize(std::array<float, kDescriptorSize>* values, Descriptor* descriptor) {
   Eigen::Map<Eigen::Array<float, kDescriptorSize, 1>> vector(values->data());
   const float strength = std::sqrt(vector.square().sum());
   if (!(strength > kMinStrength)) return false;
@@ -238,7 +238,7 @@ bool DescribeRotated(const BlurredWindow& window, float direction_rad, Descripto
       }
     }
   }
-  return Normalise(&values, descriptor);
+  return Normalize(&values, descriptor);
 }
 
 bool DescriptorFits(const cv::Mat& image, const Eigen::Vector2f& pixel) {

@@ -133,7 +133,7 @@ float CorrelationOf(const PatchPixels& a, const PatchPixels& b) {
 }
 
 // Computes all sums and the Hessian from pixels and gradients. False if too little texture is left.
-bool Summarise(PatchTemplate* patch) {
+bool Summarize(PatchTemplate* patch) {
   int sum = 0, sum_of_squares = 0, sum_x = 0, sum_y = 0, dot_x = 0, dot_y = 0, xx = 0, xy = 0, yy = 0;
   for (std::size_t at = 0; at < kPatchArea; ++at) {
     const int value = patch->pixels[at], x = patch->gradient_x[at], y = patch->gradient_y[at];
@@ -173,7 +173,7 @@ bool LimitBrightness(const PatchTemplate& patch, int count, PatchTemplate* limit
     limited->gradient_x[at] = flat ? std::int16_t{0} : patch.gradient_x[at];
     limited->gradient_y[at] = flat ? std::int16_t{0} : patch.gradient_y[at];
   }
-  return Summarise(limited);
+  return Summarize(limited);
 }
 
 // The contrast of the image relative to the patch's.

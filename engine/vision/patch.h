@@ -42,7 +42,7 @@ struct PatchTemplate {
 bool CutPatch(const cv::Mat& source, const Eigen::Vector2f& center, const Eigen::Matrix2f& source_from_patch,
               PatchTemplate* patch);
 
-// Zero-mean normalised cross-correlation of the template with the image around the integer pixel (x, y), in
+// Zero-mean normalized cross-correlation of the template with the image around the integer pixel (x, y), in
 // [-1, 1]. Precondition: the patch lies inside the image.
 float PatchCorrelation(const PatchTemplate& patch, const cv::Mat& image, int x, int y);
 
@@ -55,7 +55,7 @@ inline bool PatchFits(const cv::Mat& image, float x, float y, float margin = 0.0
 
 struct PatchAlignment {
   Eigen::Vector2f pixel;
-  float correlation = 0;  // zero-mean normalised, after the last iteration
+  float correlation = 0;  // zero-mean normalized, after the last iteration
 };
 // Inverse-compositional alignment (Baker and Matthews 2004) of translation and brightness from `start`. Empty
 // if it does not converge within `max_iterations` or moves further than max_shift_px.

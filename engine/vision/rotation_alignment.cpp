@@ -149,7 +149,7 @@ struct Sums {
   int compared = 0;
 };
 
-Comparison Summarise(const Sums& sums) {
+Comparison Summarize(const Sums& sums) {
   Comparison result;
   if (sums.valid == 0 || sums.compared < 6) return result;
   const double count = sums.compared;
@@ -223,7 +223,7 @@ class RotationAligner {
       }
       sums.products += row_sum.cast<double>();
     }
-    return Summarise(sums);
+    return Summarize(sums);
   }
 
  private:

@@ -11,7 +11,7 @@
 namespace docent::engine {
 
 // The camera rotation b_from_a between two images with similar viewing directions, estimated by efficient
-// second-order minimisation over SO(3) through the lens model (ESM, Benhimane and Malis 2007; ptamm §3.2).
+// second-order minimization over SO(3) through the lens model (ESM, Benhimane and Malis 2007; ptamm §3.2).
 struct RotationAlignment {
   Rotation3 b_from_a;
   double rms = 0;      // grey values, after alignment, over the overlap

@@ -54,7 +54,7 @@ class TwistManifold : public ceres::Manifold {
     Eigen::Map<Eigen::Matrix<double, kPoseSize, kTwistSize, Eigen::RowMajor>>(jacobian).setIdentity();
     return true;
   }
-  // Only Plus is needed to minimise.
+  // Only Plus is needed to minimize.
   bool Minus(const double*, const double*, double*) const override { return false; }
   bool MinusJacobian(const double*, double*) const override { return false; }
 };

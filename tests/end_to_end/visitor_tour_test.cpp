@@ -286,7 +286,7 @@ TEST_F(VisitorOfFiveStops, CompletesTheTourByWhatIsSpoken) {
   EXPECT_THAT(spoken, Contains("To Bay 3")) << "the card and the signpost are read";
   EXPECT_THAT(spoken, Contains(HasSubstr(": To Bay 3"))) << "the side of the way on is said";
   EXPECT_THAT(spoken, Contains(AnyOf(HasSubstr("Go back to Bay 0"), HasSubstr("where you see one of these"))))
-      << "what to do when nothing is recognised";
+      << "what to do when nothing is recognized";
   EXPECT_THAT(spoken, Contains(HasSubstr("Go to one of these places")));
 }
 

@@ -44,7 +44,7 @@ struct BundleOptions {
   RobustLoss loss = RobustLoss::kTukey;  // ptamm §2.3
   int max_iterations = 10;
   // The robust threshold sigma_T is this factor times a robust estimate (median absolute deviation) of the
-  // normalised residuals' standard deviation, never below min_sigma. 4.685 is Tukey's 95 % efficiency.
+  // normalized residuals' standard deviation, never below min_sigma. 4.685 is Tukey's 95 % efficiency.
   double threshold_factor = 4.685;
   double min_sigma = 0.4;
   // The adjustment stops once this becomes true; it is read every few points and before each product of
@@ -63,7 +63,7 @@ struct BundleSummary {
   // Half the sum of the robust losses of all measurements. Both costs use the threshold that was reached
   // last; final_cost <= initial_cost always.
   double initial_cost = 0, final_cost = 0;
-  double sigma = 0;  // of the normalised residuals along one axis, at the final state
+  double sigma = 0;  // of the normalized residuals along one axis, at the final state
   int iterations = 0;
   int outliers = 0;
   double seconds = 0;

@@ -44,7 +44,7 @@ class BundleSystem {
   int measurement_index(std::size_t i) const { return order_[i]; }
 
   enum class Outcome { kDone, kSingular, kInterrupted };
-  // Computes the step that minimises the weighted squares at this robust threshold plus `damping` times the
+  // Computes the step that minimizes the weighted squares at this robust threshold plus `damping` times the
   // diagonal of the Hessian, and evaluates the state after it. The current state does not change.
   Outcome Step(double threshold, double damping);
   // Valid after a Step that returned kDone: the squared norms after the step, the decrease of half the

@@ -23,7 +23,7 @@ struct LoopVerificationOptions {
   int min_inliers = 50;
   double min_inlier_ratio = 0.15;    // of the points that project into the image; many are occluded
   int min_cells = 7;                 // occupied cells of a 4x4 grid over the image
-  double max_sigma = 2.0;            // robust standard deviation of the normalised residuals
+  double max_sigma = 2.0;            // robust standard deviation of the normalized residuals
   double max_position_sigma = 0.02;  // ratio of the mean depth of the inliers
   // A point of the place and a recent point that are observed within this distance count as duplicates.
   double max_duplicate_px = 2.0;  // of the coarser of their levels

@@ -14,7 +14,7 @@
 namespace docent::engine {
 namespace {
 
-// A recognised keyframe of B, and the similarity that it implies.
+// A recognized keyframe of B, and the similarity that it implies.
 struct Recognition {
   std::size_t order = 0;  // index of the keyframe in OverlapKeyFrames::in_b
   LoopCandidate candidate;
@@ -42,8 +42,8 @@ class OverlapFinder {
     MapOverlap overlap;
     const std::size_t min_keyframes = options_.min_consecutive;
     if (keyframes_.in_a.size() < min_keyframes || keyframes_.in_b.size() < min_keyframes) return overlap;
-    RecogniseKeyFrames(&overlap);
-    overlap.outcome = Outcome::kNothingRecognised;
+    RecognizeKeyFrames(&overlap);
+    overlap.outcome = Outcome::kNothingRecognized;
     std::vector<OverlapEvidence> examined;
     for (const std::size_t seed : BySupport()) {
       if (examined.size() >= options_.max_hypotheses || Interrupted()) break;
@@ -73,7 +73,7 @@ class OverlapFinder {
     overlap.candidates = std::move(best.candidates);
     if (Interrupted()) {
       overlap.outcome = Outcome::kInterrupted;
-    } else if (overlap.recognised > 0) {
+    } else if (overlap.recognized > 0) {
       overlap.outcome = Decide(overlap);
     }
     return overlap;
@@ -83,7 +83,7 @@ class OverlapFinder {
   const KeyFrame& At(KeyFrameId id) const { return map_->keyframes().at(id).keyframe; }
   bool Interrupted() const { return interrupt_ && *interrupt_; }
   MapOverlap::Outcome Decide(const MapOverlap& overlap) const;
-  void RecogniseKeyFrames(MapOverlap* overlap);
+  void RecognizeKeyFrames(MapOverlap* overlap);
   std::vector<std::size_t> BySupport() const;
   bool Confirms(const OverlapEvidence& evidence, const LoopCandidate& candidate) const;
   std::size_t LongestSeries(const Sim3& a_from_b) const;
@@ -120,7 +120,7 @@ MapOverlap::Outcome OverlapFinder::Decide(const MapOverlap& overlap) const {
   return Outcome::kOverlap;
 }
 
-void OverlapFinder::RecogniseKeyFrames(MapOverlap* overlap) {
+void OverlapFinder::RecognizeKeyFrames(MapOverlap* overlap) {
   std::set<KeyFrameId> all_of_b;
   for (const auto& [id, record] : map_->keyframes()) {
     if (!keyframes_.IsOfA(id)) all_of_b.insert(id);
@@ -132,7 +132,7 @@ void OverlapFinder::RecogniseKeyFrames(MapOverlap* overlap) {
       recognitions_.push_back({order, std::move(candidate), a_from_b});
       return false;
     });
-    if (recognitions_.size() > before) ++overlap->recognised;
+    if (recognitions_.size() > before) ++overlap->recognized;
   }
   search_.Clear();
 }
@@ -173,7 +173,7 @@ bool OverlapFinder::IsOtherViewpoint(const KeyFrame& a, const KeyFrame& b) const
   return shift > options_.min_viewpoint_step * b.mean_depth || rotation > options_.min_viewpoint_step;
 }
 
-// The largest number of consecutive keyframes of B that were recognised in agreement with the similarity.
+// The largest number of consecutive keyframes of B that were recognized in agreement with the similarity.
 std::size_t OverlapFinder::LongestSeries(const Sim3& a_from_b) const {
   std::set<std::size_t> agreeing;
   for (const Recognition& recognition : recognitions_) {

@@ -11,7 +11,7 @@
 #include "engine/mapping/loops/loop_candidate_search.h"
 
 // Decides whether two maps show one place, and estimates the similarity between them. Keyframes of one map
-// are recognised in the other as for a loop (loop_candidate_search.h). Between two maps no limit on drift
+// are recognized in the other as for a loop (loop_candidate_search.h). Between two maps no limit on drift
 // rules out a similar-looking but different place. A similarity is therefore also checked against everything
 // that it brings into view: of the keyframes that should see points of the other map, most must find most of
 // these points, and no other similarity may do nearly as well. For one thread at a time; equal input gives an
@@ -20,7 +20,7 @@ namespace docent::engine {
 
 struct MapOverlapOptions {
   LoopCandidateSearchOptions search = ThoroughSearch();
-  // This many consecutive keyframes, each from another viewpoint than the one before, must be recognised and
+  // This many consecutive keyframes, each from another viewpoint than the one before, must be recognized and
   // agree, as for a loop.
   std::size_t min_consecutive = 3;
   // Ratio of the median depth, radians, logarithm of the scale: as for a loop.
@@ -74,7 +74,7 @@ struct MapOverlap {
   enum class Outcome : std::uint8_t {
     kOverlap,
     kNothingToCompare,   // a map has too few localized keyframes or no finite points
-    kNothingRecognised,  // no keyframe of B was recognised in A
+    kNothingRecognized,  // no keyframe of B was recognized in A
     kTooFewConsecutive,
     kContradicted,  // expected points are not found
     kAmbiguous,     // another similarity explains nearly as many points
@@ -83,7 +83,7 @@ struct MapOverlap {
   Outcome outcome = Outcome::kNothingToCompare;
   Sim3 a_from_b;                          // similarity of the best hypothesis
   std::vector<LoopCandidate> candidates;  // candidates that confirm it, of keyframes of both maps
-  std::size_t recognised = 0;   // keyframes of B that were recognised, whatever similarity they imply
+  std::size_t recognized = 0;   // keyframes of B that were recognized, whatever similarity they imply
   std::size_t consecutive = 0;  // consecutive keyframes that agree
   std::size_t with_view = 0, confirmed = 0;  // keyframes of both maps with a view of the other map, and those
                                              // of them that confirm the best hypothesis

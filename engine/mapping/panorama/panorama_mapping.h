@@ -36,7 +36,7 @@ struct LocalizationOptions {
   int min_inliers = 40;         // strict, since a wrong pose would harm the 3D map (hybrid-slam §4)
   double min_inlier_ratio = 0.4;
   int min_cells = 6;                 // occupied cells of a 4x4 grid over the image
-  double max_sigma = 2.0;            // robust standard deviation of the normalised residuals
+  double max_sigma = 2.0;            // robust standard deviation of the normalized residuals
   double max_position_sigma = 0.01;  // ratio of the median depth of the inliers, from the covariance
 
   // Describes the first invalid option in one sentence, or empty.

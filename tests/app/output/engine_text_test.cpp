@@ -104,7 +104,7 @@ TEST(JoinRefusalText, SaysWhyTwoMapsWereNotJoined) {
   overlap.outcome = MapOverlap::Outcome::kTooFewConsecutive;
   overlap.consecutive = 2;
   EXPECT_EQ(TextOf(JoinRefusal::kNoOverlap, overlap),
-            "only 2 consecutive keyframes are recognised at the same place");
+            "only 2 consecutive keyframes are recognized at the same place");
   overlap.outcome = MapOverlap::Outcome::kContradicted;
   overlap.with_view = 8;
   overlap.confirmed = 5;

@@ -80,7 +80,7 @@ TEST(RelativePose, IsCorrectWithTenPercentOutliers) {
   EXPECT_NEAR(estimate.rotation_sigma_deg, 0.2, 0.05);
 }
 
-TEST(Rig, IsRecognisedAsRigidFromUnsynchronizedCameras) {
+TEST(Rig, IsRecognizedAsRigidFromUnsynchronizedCameras) {
   const engine::CameraRig rig = Watch(8, [](double) { return Rigid3(); });
   ASSERT_TRUE(rig.estimate());
   EXPECT_TRUE(rig.estimate()->rigid) << TextOf(*rig.estimate());

@@ -127,7 +127,7 @@ struct Loss {
 // Seconds until the tracker relocalizes; 60 when it never does.
 template <typename Next, typename AddEmptyView>
 double Find(const RoomWithTable& room, const Loss& loss, std::uint64_t seed, const Next& next,
-            const AddEmptyView& not_recognised) {
+            const AddEmptyView& not_recognized) {
   engine::Tracker tracker = room.NewTracker(seed);
   HeadMotion motion(SimulatedHead::Range());
   motion.LookAt(loss.at, {});
@@ -140,7 +140,7 @@ double Find(const RoomWithTable& room, const Loss& loss, std::uint64_t seed, con
     engine::Frame frame = room.Image(loss.world_from_carrier * turn, i);
     frame.time = now;
     if (engine::HasPose(tracker.Track(frame, &room.index()).state)) return i / kFramesPerSecond;
-    not_recognised(at);
+    not_recognized(at);
     motion.LookAt(next(at), now);
   }
   return kMost / kFramesPerSecond;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What a session does with a lost camera that recognises no map.
+// What a session does with a lost camera that recognizes no map.
 #include <gtest/gtest.h>
 
 #include <algorithm>

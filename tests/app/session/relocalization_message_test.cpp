@@ -51,7 +51,7 @@ TEST(RelocalizationMessage, DoesNotNameTheMapWhenThereAreFewInliers) {
                                 .inliers = 7},
                                NameOf);
   EXPECT_EQ(messages, 1);
-  EXPECT_THAT(message.text(), HasSubstr("don't recognise"));
+  EXPECT_THAT(message.text(), HasSubstr("don't recognize"));
 }
 
 TEST(RelocalizationMessage, IsClearedByAPoseAndWhenNothingResemblesTheImage) {

@@ -111,7 +111,7 @@ TEST(RouteState, SkipsAStopOnRequest) {
   EXPECT_THAT(state.TakeEvents(), IsEmpty());
 }
 
-TEST(RouteState, HasSkippedTheStopsBeforeALaterOneWhereTheVisitorIsRecognised) {
+TEST(RouteState, HasSkippedTheStopsBeforeALaterOneWhereTheVisitorIsRecognized) {
   RouteState state(RouteWith(4));
   Stay(1, &state);
   Stay(4, &state);

@@ -77,7 +77,7 @@ TEST(Session, KeepsWhatIsPlacedUndoneAndRedoneInTheLibrary) {
   const Seen seen = Feed(visit, Pace::kEager, &session);
   EXPECT_GT(seen.poses, visit->frame_count() / 3);
 
-  // The same when maps are loaded on demand: when the camera recognises them, or by name.
+  // The same when maps are loaded on demand: when the camera recognizes them, or by name.
   tour.memory.read_at_start_bytes = 0;
   Session seeing(tour, LensOf(*simulation), &library), naming(tour, LensOf(*simulation), &library);
   EXPECT_EQ(seeing.Maps().at(0).snapshot, nullptr);
@@ -211,7 +211,7 @@ TEST_F(AuthoredBay, GivesAVisitorElsewhereTheRejectionReasonWithFewEvents) {
   EXPECT_GE(reported, 1);
   EXPECT_LE(reported, 3);
   EXPECT_THAT(session.ShownWith(seen.frames.back()).hint,
-              AnyOf(HasSubstr("recognise"), HasSubstr("resembles"), HasSubstr("shows"), HasSubstr("could be"),
+              AnyOf(HasSubstr("recognize"), HasSubstr("resembles"), HasSubstr("shows"), HasSubstr("could be"),
                     HasSubstr("Probably")));
 }
 

@@ -13,7 +13,7 @@ using ::testing::HasSubstr;
 using ::testing::IsEmpty;
 using ::testing::Not;
 
-TEST(VisitState, WelcomesAVisitorUntilAPlaceIsRecognised) {
+TEST(VisitState, WelcomesAVisitorUntilAPlaceIsRecognized) {
   VisitState visit({"Lions", "Masks"});
   ui::VisitorDisplay display = visit.Update(7, "", "");
   EXPECT_TRUE(display.is_searching);
@@ -25,23 +25,23 @@ TEST(VisitState, WelcomesAVisitorUntilAPlaceIsRecognised) {
   EXPECT_EQ(display.sentence, "");
 }
 
-TEST(VisitState, LetsTheWelcomeBeReadBeforeItSaysThatNothingIsRecognised) {
+TEST(VisitState, LetsTheWelcomeBeReadBeforeItSaysThatNothingIsRecognized) {
   const VisitTimes times;
   const VisitorStrings& strings = VisitorStringsFor("en");
   VisitState visit({"Lions", "Masks"});
-  EXPECT_EQ(visit.Update(0, "", strings.not_recognised).sentence, strings.welcome);
-  EXPECT_EQ(visit.Update(0.9 * times.welcome, "", strings.not_recognised).sentence, strings.welcome);
+  EXPECT_EQ(visit.Update(0, "", strings.not_recognized).sentence, strings.welcome);
+  EXPECT_EQ(visit.Update(0.9 * times.welcome, "", strings.not_recognized).sentence, strings.welcome);
   EXPECT_TRUE(visit.Welcomes(0.9 * times.welcome));
   EXPECT_EQ(visit.Update(0.95 * times.welcome, "", "Probably Lions; hold still").sentence,
             "Probably Lions; hold still");
-  EXPECT_EQ(visit.Update(1.1 * times.welcome, "", strings.not_recognised).sentence, strings.not_recognised);
+  EXPECT_EQ(visit.Update(1.1 * times.welcome, "", strings.not_recognized).sentence, strings.not_recognized);
   EXPECT_FALSE(visit.Welcomes(1.1 * times.welcome));
   visit.Update(6, "Lions", "");
   visit.Update(8, "", "");
   EXPECT_FALSE(visit.Welcomes(8)) << "who was somewhere knows what to do";
 }
 
-TEST(VisitState, ShowsTheEntrancesToWhoIsNotRecognisedSoon) {
+TEST(VisitState, ShowsTheEntrancesToWhoIsNotRecognizedSoon) {
   const VisitTimes times;
   VisitState visit({"Lions", "Masks"});
   visit.Update(0, "", "");
@@ -95,7 +95,7 @@ TEST(VisitState, HelpsMoreTheLongerAVisitorSearches) {
   EXPECT_FALSE(visit.WantsViews(times.held + 0.9 * times.way_back));
   EXPECT_TRUE(visit.WantsViews(times.held + times.way_back));
   EXPECT_FALSE(visit.WantsViews(times.held + times.stops));
-  // Who was never recognised is helped as well.
+  // Who was never recognized is helped as well.
   VisitState stranger({"Lions"});
   stranger.Update(5, "", "");
   EXPECT_THAT(stranger.Update(5 + times.stops, "", "").stops, ElementsAre("Lions"));

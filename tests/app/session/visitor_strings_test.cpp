@@ -98,7 +98,7 @@ TEST(VisitorStrings, LeadAVisitorInTheirLanguage) {
   EXPECT_TRUE(arabic.Update(0, "", "").is_right_to_left);
 }
 
-TEST(VisitorHint, SaysWhyAPlaceIsNotRecognised) {
+TEST(VisitorHint, SaysWhyAPlaceIsNotRecognized) {
   const VisitorStrings& english = VisitorStringsFor("en");
   RejectionMessage rejection{
       .reason = engine::RejectionReason::kAmbiguous, .map = "Lions", .competitor = "Masks"};

@@ -127,7 +127,7 @@ TEST(Wearable, BuildsOneMapWithBothCamerasAndEachTracksWhatTheOtherMapped) {
       << "these cameras move relative to each other: " << TextOf(*walk.rig);
 }
 
-TEST(Wearable, RecognisesThatItsCamerasAreRigidlyConnected) {
+TEST(Wearable, RecognizesThatItsCamerasAreRigidlyConnected) {
   const WalkOfTwoCameras walk = Take("hand:1", "shoulder:1", 16, Pace::kLockstep);
   ASSERT_TRUE(walk.rig);
   EXPECT_TRUE(walk.rig->rigid) << TextOf(*walk.rig);

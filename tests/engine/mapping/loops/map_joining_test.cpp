@@ -28,8 +28,8 @@ using OverlapOutcome = MapOverlap::Outcome;
 // The figures of a comparison, for messages.
 std::string Brief(const MapOverlap& overlap) {
   std::ostringstream text;
-  text << "outcome " << static_cast<int>(overlap.outcome) << ", " << overlap.recognised
-       << " keyframes recognised, " << overlap.consecutive << " consecutive, " << overlap.confirmed << " of "
+  text << "outcome " << static_cast<int>(overlap.outcome) << ", " << overlap.recognized
+       << " keyframes recognized, " << overlap.consecutive << " consecutive, " << overlap.confirmed << " of "
        << overlap.with_view << " confirm, found ratio " << overlap.found_ratio << ", " << overlap.contradicted
        << " of " << overlap.regions << " regions contradict, points " << overlap.points << " and "
        << overlap.second_points;
