@@ -37,16 +37,6 @@ const char* NameOf(engine::BundleSummary::Outcome outcome) {
   return "unknown";
 }
 
-std::string TextOfContradiction(const engine::MapOverlap& overlap) {
-  if (overlap.contradicted > 0 && overlap.confirmed == overlap.with_view)
-    return Printed("they look alike, but their surfaces differ in %zu of %zu image regions",
-                   overlap.contradicted, overlap.regions);
-  return Printed(
-      "they look alike, but only %zu of %zu keyframes that should show the other map match it, and find %.0f "
-      "%% of its points",
-      overlap.confirmed, overlap.with_view, 100 * overlap.found_ratio);
-}
-
 std::string ReasonOf(const engine::MapOverlap& overlap) {
   using Outcome = engine::MapOverlap::Outcome;
   switch (overlap.outcome) {
@@ -58,8 +48,17 @@ std::string ReasonOf(const engine::MapOverlap& overlap) {
       return "no place of one map is recognized in the other";
     case Outcome::kTooFewConsecutive:
       return Printed("only %zu consecutive keyframes are recognized at the same place", overlap.consecutive);
-    case Outcome::kContradicted:
-      return TextOfContradiction(overlap);
+    case Outcome::kTooFewConfirmed:
+      return Printed("they look alike, but only %zu of %zu keyframes that should show the other map match it",
+                     overlap.confirmed, overlap.with_view);
+    case Outcome::kTooFewPoints:
+      return Printed(
+          "they look alike, but keyframes that should show the other map find only %.0f %% of its "
+          "points",
+          100 * overlap.found_ratio);
+    case Outcome::kSurfacesDiffer:
+      return Printed("they look alike, but their surfaces differ in %zu of %zu image regions",
+                     overlap.contradicted, overlap.regions);
     case Outcome::kAmbiguous:
       return "several places in the other map look the same";
     case Outcome::kInterrupted:

@@ -107,13 +107,13 @@ class OverlapFinder {
 MapOverlap::Outcome OverlapFinder::Decide(const MapOverlap& overlap) const {
   using Outcome = MapOverlap::Outcome;
   if (overlap.consecutive < options_.min_consecutive) return Outcome::kTooFewConsecutive;
-  const auto confirmed = static_cast<double>(overlap.confirmed);
-  if (confirmed < options_.min_confirmed_ratio * static_cast<double>(overlap.with_view) ||
-      overlap.found_ratio < options_.min_found_ratio ||
-      static_cast<double>(overlap.contradicted) >
-          options_.max_contradicted_ratio * static_cast<double>(overlap.regions)) {
-    return Outcome::kContradicted;
-  }
+  if (static_cast<double>(overlap.confirmed) <
+      options_.min_confirmed_ratio * static_cast<double>(overlap.with_view))
+    return Outcome::kTooFewConfirmed;
+  if (overlap.found_ratio < options_.min_found_ratio) return Outcome::kTooFewPoints;
+  if (static_cast<double>(overlap.contradicted) >
+      options_.max_contradicted_ratio * static_cast<double>(overlap.regions))
+    return Outcome::kSurfacesDiffer;
   if (static_cast<double>(overlap.second_points) >
       options_.max_second_ratio * static_cast<double>(overlap.points))
     return Outcome::kAmbiguous;

@@ -13,9 +13,9 @@
 // Decides whether two maps show one place, and estimates the similarity between them. Keyframes of one map
 // are recognized in the other as for a loop (loop_candidate_search.h). Between two maps no limit on drift
 // rules out a similar-looking but different place. A similarity is therefore also checked against everything
-// that it brings into view: of the keyframes that should see points of the other map, most must find most of
-// these points, and no other similarity may do nearly as well. For one thread at a time; equal input gives an
-// equal result.
+// that it brings into view: most of the keyframes that should see points of the other map must find many of
+// them, the surfaces must agree, and no other similarity may do nearly as well. For one thread at a time;
+// equal input gives an equal result.
 namespace docent::engine {
 
 struct MapOverlapOptions {
@@ -76,8 +76,10 @@ struct MapOverlap {
     kNothingToCompare,   // a map has too few localized keyframes or no finite points
     kNothingRecognized,  // no keyframe of B was recognized in A
     kTooFewConsecutive,
-    kContradicted,  // expected points are not found
-    kAmbiguous,     // another similarity explains nearly as many points
+    kTooFewConfirmed,  // too few of the keyframes with a view of the other map find what they should see
+    kTooFewPoints,     // those that do find too few of its points
+    kSurfacesDiffer,   // in too many regions the other map shows something else
+    kAmbiguous,        // another similarity explains nearly as many points
     kInterrupted,
   };
   Outcome outcome = Outcome::kNothingToCompare;

@@ -105,15 +105,17 @@ TEST(JoinRefusalText, SaysWhyTwoMapsWereNotJoined) {
   overlap.consecutive = 2;
   EXPECT_EQ(TextOf(JoinRefusal::kNoOverlap, overlap),
             "only 2 consecutive keyframes are recognized at the same place");
-  overlap.outcome = MapOverlap::Outcome::kContradicted;
+  overlap.outcome = MapOverlap::Outcome::kTooFewConfirmed;
   overlap.with_view = 8;
-  overlap.confirmed = 5;
-  overlap.found_ratio = 0.17;
-  EXPECT_EQ(
-      TextOf(JoinRefusal::kNoOverlap, overlap),
-      "they look alike, but only 5 of 8 keyframes that should show the other map match it, and find 17 % "
-      "of its points");
+  overlap.confirmed = 4;
+  EXPECT_EQ(TextOf(JoinRefusal::kNoOverlap, overlap),
+            "they look alike, but only 4 of 8 keyframes that should show the other map match it");
+  overlap.outcome = MapOverlap::Outcome::kTooFewPoints;
   overlap.confirmed = 8;
+  overlap.found_ratio = 0.17;
+  EXPECT_EQ(TextOf(JoinRefusal::kNoOverlap, overlap),
+            "they look alike, but keyframes that should show the other map find only 17 % of its points");
+  overlap.outcome = MapOverlap::Outcome::kSurfacesDiffer;
   overlap.contradicted = 12;
   overlap.regions = 60;
   EXPECT_EQ(TextOf(JoinRefusal::kNoOverlap, overlap),

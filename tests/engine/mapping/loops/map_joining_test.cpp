@@ -156,7 +156,7 @@ TEST(MapJoining, JoinsMapsOfWhichOneHasDrifted) {
   MapJoiningOptions strict;
   strict.overlap.min_confirmed_ratio = 0.8;
   const MapJoinAttempt refused = JoinMaps(strict, *OverlappingPair().a, *snapshot, nullptr);
-  EXPECT_EQ(refused.overlap.outcome, OverlapOutcome::kContradicted) << Brief(refused.overlap);
+  EXPECT_EQ(refused.overlap.outcome, OverlapOutcome::kTooFewConfirmed) << Brief(refused.overlap);
 }
 
 TEST(MapJoining, RejectsMapsOfDifferentPlaces) {
@@ -175,7 +175,7 @@ TEST(MapJoining, RejectsASimilarPlaceWithDifferentSurfacesAroundIt) {
   EXPECT_EQ(attempt.joined, nullptr) << Brief(attempt.overlap);
   EXPECT_EQ(attempt.refusal, JoinRefusal::kNoOverlap);
   // Every keyframe sees the common panel; only the surfaces beside it differ and contradict the similarity.
-  EXPECT_EQ(attempt.overlap.outcome, OverlapOutcome::kContradicted) << Brief(attempt.overlap);
+  EXPECT_EQ(attempt.overlap.outcome, OverlapOutcome::kSurfacesDiffer) << Brief(attempt.overlap);
   EXPECT_GT(attempt.overlap.contradicted * 5, attempt.overlap.regions) << Brief(attempt.overlap);
   MapJoiningOptions careless;
   careless.overlap.max_contradicted_ratio = 1;
