@@ -43,10 +43,12 @@ std::optional<Eigen::Vector2f> TrackPatch(const ImageFeatures& from, const Eigen
   return guess.cast<float>();
 }
 
-// The best corners of a level, at most `count`, one per grid cell so that they cover the image.
-std::vector<Corner> SpreadCorners(const ImageFeatures& features, std::size_t level, int count) {
+// The best corners of a level, at most `count`, one per grid cell so that they cover the image. density: by
+// which the edge of a cell is divided.
+std::vector<Corner> SpreadCorners(const ImageFeatures& features, std::size_t level, int count,
+                                  double density) {
   const cv::Mat& image = features.levels[level];
-  const double cell = std::max(8.0, std::sqrt(static_cast<double>(image.total()) / (1.3 * count)));
+  const double cell = std::max(8.0, std::sqrt(static_cast<double>(image.total()) / (1.3 * count)) / density);
   const int columns = static_cast<int>(image.cols / cell) + 1, rows = static_cast<int>(image.rows / cell) + 1;
   struct Best {
     float score = 0;
@@ -93,6 +95,7 @@ std::optional<std::string> InitializerOptions::Validate() const {
   return OptionCheck()
       .That(std::ranges::all_of(corners, [](int count) { return count >= 0; }),
             "The number of corners of a level must be at least 0.")
+      .AtLeast(plain_scene_corners, 0, "number of corners in a plain scene")
       .AtLeast(min_motion_px, 0, "motion between two views")
       .Ratio(min_alive_ratio, "ratio of tracked corners")
       .AtLeast(min_alive, 0, "number of tracked corners")
@@ -131,15 +134,23 @@ void Initializer::UpdateProgress(double progress) {
   progress_ = std::max(progress, kKept * progress_);
 }
 
-void Initializer::Start(Timestamp time, const std::shared_ptr<const ImageFeatures>& features) {
-  trails_.clear();
-  confirmation_.Reset();
+void Initializer::AddCorners(const ImageFeatures& features, double density) {
   for (std::size_t level = 0; level < options_.corners.size(); ++level) {
-    for (const Corner& corner : SpreadCorners(*features, level, options_.corners[level])) {
+    for (const Corner& corner : SpreadCorners(features, level, options_.corners[level], density)) {
       const Eigen::Vector2f pixel =
           LevelZeroFromLevel(Eigen::Vector2d(corner.x, corner.y), static_cast<int>(level)).cast<float>();
       trails_.push_back({pixel, pixel, static_cast<int>(level), static_cast<std::uint32_t>(trails_.size())});
     }
+  }
+}
+
+void Initializer::Start(Timestamp time, const std::shared_ptr<const ImageFeatures>& features) {
+  trails_.clear();
+  confirmation_.Reset();
+  AddCorners(*features, 1);
+  if (static_cast<int>(trails_.size()) < options_.plain_scene_corners) {
+    trails_.clear();
+    AddCorners(*features, 2);
   }
   trails_at_start_ = trails_.size();
   age_frames_ = 0;

@@ -10,6 +10,7 @@
 #include <memory>
 #include <numbers>
 #include <numeric>
+#include <opencv2/imgproc.hpp>
 #include <optional>
 #include <set>
 #include <string>
@@ -123,6 +124,31 @@ TEST(Initializer, AsksForDetailInABlankImage) {
         initializer.Track(FromSeconds(i / 30.0), MakeFeatures(cv::Mat(240, 320, CV_8UC1, cv::Scalar(100)))));
     EXPECT_EQ(initializer.hint(), Hint::kStartWhereThereIsDetail);
   }
+}
+
+// An image that is grey but for a textured square with edges of this length.
+cv::Mat ImageWithObject(int edge_px) {
+  cv::Mat image(480, 640, CV_8UC1, cv::Scalar(100));
+  cv::Mat object = image(cv::Rect(320 - edge_px / 2, 240 - edge_px / 2, edge_px, edge_px));
+  cv::RNG random(57);
+  random.fill(object, cv::RNG::UNIFORM, 0, 255);
+  cv::GaussianBlur(object, object, {}, 1.5);
+  return image;
+}
+
+std::size_t CornersAtStart(const InitializerOptions& options, const cv::Mat& image) {
+  Initializer initializer(options, Camera(), 5);
+  initializer.Track({}, MakeFeatures(image));
+  return initializer.trails().size();
+}
+
+TEST(Initializer, TakesMoreCornersOfTheObjectsInAPlainScene) {
+  InitializerOptions coarse;
+  coarse.plain_scene_corners = 0;
+  const cv::Mat object = ImageWithObject(160), furnished = ImageWithObject(480);
+  EXPECT_LT(CornersAtStart(coarse, object), 100u);
+  EXPECT_GT(CornersAtStart({}, object), 2 * CornersAtStart(coarse, object));
+  EXPECT_EQ(CornersAtStart({}, furnished), CornersAtStart(coarse, furnished));
 }
 
 TEST(Initializer, TracksCornersToTheirTruePixels) {
