@@ -5,72 +5,14 @@
 #include <cmath>
 
 #include "engine/base/option_check.h"
-#include "engine/vision/rotation_alignment.h"
 
 namespace docent::engine {
 
 namespace {
 
-constexpr float kMinCorrelation = 0.8f;
-constexpr float kMaxRoundTripPx = 0.7f;  // of the corner's level, tracked forwards and backwards
 // Shares of the progress: the image moves enough, and the parallax is significant; the third view is the
 // rest.
 constexpr double kMotionShare = 0.2, kParallaxShare = 0.6;
-constexpr float kMaxStepPx = 4.0f;  // of each level: how far the alignment may move from the prediction
-
-// Tracks one patch of `from` into `to`, from coarse levels to the corner's own level.
-std::optional<Eigen::Vector2f> TrackPatch(const ImageFeatures& from, const Eigen::Vector2f& pixel,
-                                          const ImageFeatures& to, const Eigen::Vector2f& prediction,
-                                          int level) {
-  Eigen::Vector2d guess = prediction.cast<double>();
-  PatchTemplate patch;
-  for (int l = kPyramidLevels - 1; l >= level; --l) {
-    const auto index = static_cast<std::size_t>(l);
-    const Eigen::Vector2f source = LevelFromLevelZero(pixel.cast<double>(), l).cast<float>();
-    const bool finest = l == level;
-    const bool cut = CutPatch(from.levels[index], source, Eigen::Matrix2f::Identity(), &patch);
-    std::optional<PatchAlignment> aligned;
-    if (cut) {
-      aligned =
-          AlignPatch(patch, to.levels[index], LevelFromLevelZero(guess, l).cast<float>(), kMaxStepPx, 12);
-    }
-    if (aligned && aligned->correlation > kMinCorrelation) {
-      guess = LevelZeroFromLevel(aligned->pixel.cast<double>(), l);
-    } else if (finest) {
-      return std::nullopt;
-    }
-  }
-  return guess.cast<float>();
-}
-
-// The best corners of a level, at most `count`, one per grid cell so that they cover the image. density: by
-// which the edge of a cell is divided.
-std::vector<Corner> SpreadCorners(const ImageFeatures& features, std::size_t level, int count,
-                                  double density) {
-  const cv::Mat& image = features.levels[level];
-  const double cell = std::max(8.0, std::sqrt(static_cast<double>(image.total()) / (1.3 * count)) / density);
-  const int columns = static_cast<int>(image.cols / cell) + 1, rows = static_cast<int>(image.rows / cell) + 1;
-  struct Best {
-    float score = 0;
-    Corner corner;
-  };
-  std::vector<Best> best(static_cast<std::size_t>(columns * rows));
-  for (const Corner& corner : features.corners[level]) {
-    if (!PatchFits(image, corner.x, corner.y, 3.0f)) continue;
-    const float score = ShiTomasiScore(image, corner.x, corner.y);
-    Best& place = best[static_cast<std::size_t>(static_cast<int>(corner.y / cell) * columns +
-                                                static_cast<int>(corner.x / cell))];
-    if (score > place.score) place = {score, corner};
-  }
-  std::erase_if(best, [](const Best& place) { return place.score < 30.0f; });
-  std::stable_sort(best.begin(), best.end(), [](const Best& a, const Best& b) { return a.score > b.score; });
-  std::vector<Corner> corners;
-  for (const Best& place : best) {
-    if (static_cast<int>(corners.size()) >= count) break;
-    corners.push_back(place.corner);
-  }
-  return corners;
-}
 
 using Rays = std::vector<Eigen::Vector3d>;
 
@@ -93,15 +35,10 @@ bool HasDepth(const TwoViewResult& geometry) {
 
 std::optional<std::string> InitializerOptions::Validate() const {
   return OptionCheck()
-      .That(std::ranges::all_of(corners, [](int count) { return count >= 0; }),
-            "The number of corners of a level must be at least 0.")
-      .AtLeast(plain_scene_corners, 0, "number of corners in a plain scene")
       .AtLeast(min_motion_px, 0, "motion between two views")
-      .Ratio(min_alive_ratio, "ratio of tracked corners")
-      .AtLeast(min_alive, 0, "number of tracked corners")
-      .AtLeast(max_age_frames, 1, "age of the first view")
       .AtLeast(attempt_interval, 1, "interval between two estimates")
       .AtLeast(unknown_readout_s, 0, "unknown readout time")
+      .Contained(tracks.Validate())
       .Contained(two_view.Validate())
       .Contained(confirmation.Validate())
       .fault();
@@ -112,6 +49,7 @@ Initializer::Initializer(const InitializerOptions& options, std::shared_ptr<cons
     : options_(Checked(options)),
       camera_(std::move(camera)),
       random_(seed),
+      tracks_(options.tracks),
       confirmation_(options.confirmation),
       views_confirmation_(options.confirmation) {}
 
@@ -121,10 +59,8 @@ void Initializer::SetCamera(std::shared_ptr<const CameraModel> camera) {
 }
 
 void Initializer::Reset() {
-  trails_.clear();
+  tracks_.Reset();
   confirmation_.Reset();
-  first_.reset();
-  previous_.reset();
   hint_ = Hint::kNone;
   progress_ = 0;
 }
@@ -134,97 +70,32 @@ void Initializer::UpdateProgress(double progress) {
   progress_ = std::max(progress, kKept * progress_);
 }
 
-void Initializer::AddCorners(const ImageFeatures& features, double density) {
-  for (std::size_t level = 0; level < options_.corners.size(); ++level) {
-    for (const Corner& corner : SpreadCorners(features, level, options_.corners[level], density)) {
-      const Eigen::Vector2f pixel =
-          LevelZeroFromLevel(Eigen::Vector2d(corner.x, corner.y), static_cast<int>(level)).cast<float>();
-      trails_.push_back({pixel, pixel, static_cast<int>(level), static_cast<std::uint32_t>(trails_.size())});
-    }
-  }
-}
-
 void Initializer::Start(Timestamp time, const std::shared_ptr<const ImageFeatures>& features) {
-  trails_.clear();
   confirmation_.Reset();
-  AddCorners(*features, 1);
-  if (static_cast<int>(trails_.size()) < options_.plain_scene_corners) {
-    trails_.clear();
-    AddCorners(*features, 2);
-  }
-  trails_at_start_ = trails_.size();
-  age_frames_ = 0;
-  first_time_ = previous_time_ = time;
-  first_ = previous_ = features;
-  const bool enough = static_cast<int>(trails_.size()) >= options_.min_alive;
-  hint_ = enough ? Hint::kMoveSideways : Hint::kStartWhereThereIsDetail;
-}
-
-void Initializer::TrackCorners(Timestamp time, const ImageFeatures& features) {
-  const auto rotation = AlignRotation(previous_->small_blurry, *camera_, features.small_blurry, *camera_);
-  const Rotation3 now_from_previous = rotation && rotation->converged ? rotation->b_from_a : Rotation3();
-  const Eigen::Vector3d rate = now_from_previous.Log() / std::max(ToSeconds(time - previous_time_), 1e-3);
-  last_rates_ = {age_frames_ == 1 ? rate : last_rates_[1], rate};
-  if (age_frames_ == 1) first_rates_ = last_rates_;
-  if (age_frames_ == 2) first_rates_[1] = rate;
-  std::erase_if(trails_, [&](Trail& trail) {
-    const auto ray = camera_->Unproject(trail.now.cast<double>());
-    if (!ray) return true;
-    const auto prediction = camera_->Project(now_from_previous * *ray);
-    if (!prediction || !camera_->IsInside(*prediction, 6)) return true;
-    const auto now = TrackPatch(*previous_, trail.now, features, prediction->cast<float>(), trail.level);
-    if (!now || !camera_->IsInside(now->cast<double>(), 6)) return true;
-    const auto back = TrackPatch(features, *now, *previous_, trail.now, trail.level);
-    if (!back || (*back - trail.now).norm() > kMaxRoundTripPx * static_cast<float>(1 << trail.level))
-      return true;
-    trail.step = *now - trail.now;
-    if (age_frames_ == 1) trail.first_step = trail.step;
-    trail.now = *now;
-    return false;
-  });
+  tracks_.Start(time, features);
+  hint_ = tracks_.has_enough() ? Hint::kMoveSideways : Hint::kStartWhereThereIsDetail;
 }
 
 std::optional<InitialPair> Initializer::Track(Timestamp time,
                                               const std::shared_ptr<const ImageFeatures>& features) {
-  if (!first_) {
+  if (!tracks_.started()) {
     Start(time, features);
     return std::nullopt;
   }
-  ++age_frames_;
-  TrackCorners(time, *features);
-  previous_ = features;
-  previous_time_ = time;
-  const bool too_few =
-      trails_.size() < static_cast<std::size_t>(options_.min_alive) ||
-      static_cast<double>(trails_.size()) < options_.min_alive_ratio * static_cast<double>(trails_at_start_);
-  if (too_few || age_frames_ > options_.max_age_frames) {
+  tracks_.Track(time, features, *camera_, AlignedRotation(*tracks_.newest(), *features, *camera_));
+  if (tracks_.ended()) {
     Start(time, features);
     return std::nullopt;
   }
-  if (age_frames_ % options_.attempt_interval != 0) return std::nullopt;
-  std::vector<float> motion;
-  motion.reserve(trails_.size());
-  for (const Trail& trail : trails_) motion.push_back((trail.now - trail.first).norm());
-  const auto middle = motion.begin() + static_cast<std::ptrdiff_t>(motion.size() / 2);
-  std::nth_element(motion.begin(), middle, motion.end());
+  if (tracks_.age_frames() % options_.attempt_interval != 0) return std::nullopt;
+  const double motion_px = tracks_.MedianMotionPx();
   const double min_motion_px = options_.min_motion_px * camera_->width_px() / 640.0;
-  if (*middle < min_motion_px) {
+  if (motion_px < min_motion_px) {
     hint_ = HintFor(TwoViewOutcome::kStill);
-    UpdateProgress(kMotionShare * *middle / min_motion_px);
+    UpdateProgress(kMotionShare * motion_px / min_motion_px);
     return std::nullopt;
   }
   return Attempt(time, features);
-}
-
-// The difference of the image speed between the current and the first view: the median over the keypoints.
-double Initializer::SpeedChange() const {
-  std::vector<float> changes;
-  changes.reserve(trails_.size());
-  for (const Trail& trail : trails_) changes.push_back((trail.step - trail.first_step).norm());
-  if (changes.empty()) return 0;
-  const auto middle = changes.begin() + static_cast<std::ptrdiff_t>(changes.size() / 2);
-  std::nth_element(changes.begin(), middle, changes.end());
-  return *middle;
 }
 
 std::shared_ptr<const CameraModel> Initializer::ImageCamera(const Eigen::Vector3d& newest,
@@ -238,13 +109,14 @@ std::optional<InitialPair> Initializer::Attempt(Timestamp time,
                                                 const std::shared_ptr<const ImageFeatures>& features) {
   std::vector<InitialPair::Match> matches;
   std::vector<std::uint32_t> ids;
-  for (const Trail& trail : trails_) {
+  for (const CornerTracks::Trail& trail : tracks_.trails()) {
     matches.push_back({trail.first, trail.now, static_cast<std::uint8_t>(trail.level)});
     ids.push_back(trail.id);
   }
-  auto pair = Solve({first_time_, first_, ImageCamera(first_rates_[0], first_rates_[1])},
-                    {time, features, ImageCamera(last_rates_[1], last_rates_[0])}, std::move(matches), ids,
-                    SpeedChange(), &confirmation_);
+  const auto &first_rates = tracks_.first_rates(), &last_rates = tracks_.last_rates();
+  auto pair = Solve({tracks_.first_time(), tracks_.first(), ImageCamera(first_rates[0], first_rates[1])},
+                    {time, features, ImageCamera(last_rates[1], last_rates[0])}, std::move(matches), ids,
+                    tracks_.MedianSpeedChangePx(), &confirmation_);
   if (pair) Reset();
   return pair;
 }

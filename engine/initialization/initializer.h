@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <array>
 #include <memory>
 #include <optional>
 #include <span>
@@ -9,25 +8,17 @@
 #include <vector>
 
 #include "engine/base/random.h"
+#include "engine/initialization/corner_tracks.h"
 #include "engine/initialization/initial_pair.h"
 #include "engine/initialization/start_confirmation.h"
-#include "engine/vision/patch.h"
 
 namespace docent::engine {
 
 struct InitializerOptions {
-  std::array<int, 3> corners = {350, 200, 100};  // maximum number to track, by level
-  // Plain surfaces have corners only where there are objects. Where the grid finds fewer than this, one twice
-  // as fine is used, since the tracks of a third are lost within ten images of a hand-held phone, and with
-  // fewer than min_alive the search starts again: of six runs with such a recording, one had depth within
-  // four seconds with the coarse grid, all with the fine one. In a furnished room, 360 corners are found.
-  int plain_scene_corners = 200;
+  CornerTracksOptions tracks;
   // Median motion for a 640 pixel wide image, below which the geometry is not estimated.
   double min_motion_px = 8;
-  double min_alive_ratio = 0.3;  // of the initial corners; with fewer, a new first view is taken
-  int min_alive = 80;            // corners; with fewer, a new first view is taken
-  int max_age_frames = 240;      // a first view older than this is replaced
-  int attempt_interval = 2;      // frames between two estimates of the geometry
+  int attempt_interval = 2;  // frames between two estimates of the geometry
   // While the readout time of the shutter is unknown, depth has to be significant as well if the shutter
   // rolls for so long, seconds, in any of the four directions of the image: a turn of one radian per second
   // displaces the first and the last row against each other by ten pixels, which looks like depth. 60 % of
@@ -68,31 +59,21 @@ class Initializer {
   bool awaits_confirmation() const { return awaits_confirmation_; }
 
   // Time of the first view; Timestamp::min() if there is none.
-  Timestamp first_time() const { return first_ ? first_time_ : Timestamp::min(); }
+  Timestamp first_time() const { return tracks_.first_time(); }
   // Why there is no map yet; kNone right after Reset().
   Hint hint() const { return hint_; }
   // How close the camera has come to a map, from 0 (it has not moved) to 1, for a person who waits for it. It
   // falls slowly when an attempt is worse than the one before, so that it does not flicker.
   double progress() const { return progress_; }
-  // A tracked corner: its pixel in the first view and in the current frame, level 0.
-  struct Trail {
-    Eigen::Vector2f first, now;
-    int level = 0;
-    std::uint32_t id = 0;                                                                  // ascending
-    Eigen::Vector2f first_step = Eigen::Vector2f::Zero(), step = Eigen::Vector2f::Zero();  // pixels per frame
-  };
-  const std::vector<Trail>& trails() const { return trails_; }
+  const std::vector<CornerTracks::Trail>& trails() const { return tracks_.trails(); }
 
  private:
   void Start(Timestamp time, const std::shared_ptr<const ImageFeatures>& features);
-  void AddCorners(const ImageFeatures& features, double density);
-  void TrackCorners(Timestamp time, const ImageFeatures& features);
   std::optional<InitialPair> Attempt(Timestamp time, const std::shared_ptr<const ImageFeatures>& features);
   std::optional<InitialPair> Solve(const InitialPair::View& a, const InitialPair::View& b,
                                    std::vector<InitialPair::Match> matches,
                                    std::span<const std::uint32_t> ids, double speed_change_px,
                                    StartConfirmation* confirmation);
-  double SpeedChange() const;
   // Whether two views with depth have depth whatever the readout time is, as long as it is unknown.
   bool HasDepthWithAnyReadout(const InitialPair::View& a, const InitialPair::View& b,
                               std::span<const InitialPair::Match> matches,
@@ -105,15 +86,9 @@ class Initializer {
   InitializerOptions options_;
   std::shared_ptr<const CameraModel> camera_;
   Random random_;
+  CornerTracks tracks_;
   StartConfirmation confirmation_, views_confirmation_;
-  std::vector<Trail> trails_;
-  std::size_t trails_at_start_ = 0;
-  int age_frames_ = 0;
   Eigen::Vector2d readout_s_ = Eigen::Vector2d::Zero();
-  // Mean rotation rates, radians per second: of the first two intervals between frames, and of the last two.
-  std::array<Eigen::Vector3d, 2> first_rates_, last_rates_;
-  Timestamp first_time_{}, previous_time_{};
-  std::shared_ptr<const ImageFeatures> first_, previous_;
   Hint hint_ = Hint::kNone;
   double progress_ = 0;
   bool awaits_confirmation_ = false;

@@ -9,7 +9,6 @@
 #include "engine/base/median.h"
 #include "engine/base/option_check.h"
 #include "engine/geometry/triangulation.h"
-#include "engine/vision/rotation_alignment.h"
 
 namespace docent::engine {
 
@@ -17,9 +16,8 @@ namespace {
 
 constexpr double kDegrees = 180 / std::numbers::pi;
 
-InitializerOptions TrackOnlyOptions() {
-  InitializerOptions options;
-  options.attempt_interval = std::numeric_limits<int>::max();
+CornerTracksOptions TracksBesideTheTarget() {
+  CornerTracksOptions options;
   options.max_age_frames = std::numeric_limits<int>::max();
   options.min_alive = 0;  // the points of the target alone suffice
   return options;
@@ -139,12 +137,12 @@ TargetInitializer::TargetInitializer(std::shared_ptr<const PlanarTarget> target,
       options_(Checked(options)),
       camera_(std::move(camera)),
       random_(seed),
-      corner_tracker_(TrackOnlyOptions(), camera_, seed) {
+      corner_tracks_(TracksBesideTheTarget()) {
   Reset();
 }
 
 void TargetInitializer::Reset() {
-  corner_tracker_.Reset();
+  corner_tracks_.Reset();
   first_.reset();
   detection_.reset();
   previous_.reset();
@@ -154,8 +152,7 @@ void TargetInitializer::Reset() {
 std::optional<TargetDetection> TargetInitializer::DetectOrAlign(const ImageFeatures& features) {
   if (detection_ && previous_) {
     // The motion of a hand-held camera between two frames is mostly a rotation.
-    const auto rotation = AlignRotation(previous_->small_blurry, *camera_, features.small_blurry, *camera_);
-    const Rotation3 now_from_previous = rotation && rotation->converged ? rotation->b_from_a : Rotation3();
+    const Rotation3 now_from_previous = AlignedRotation(*previous_, features, *camera_);
     if (auto tracked = target_->Align(
             features, *camera_,
             Rigid3(now_from_previous, Eigen::Vector3d::Zero()) * detection_->camera_from_target)) {
@@ -171,14 +168,9 @@ std::optional<TargetStart> TargetInitializer::Track(Timestamp time,
   detection_ = DetectOrAlign(*features);
   previous_ = features;
   if (first_) {
-    corner_tracker_.Track(time, features);
-    // The corner tracker takes a new first view when too few corners of the old one are left. All corners are
-    // then unmoved, and this initializer must take a new first view too.
-    const bool restarted = !trails().empty() &&
-                           std::all_of(trails().begin(), trails().end(), [](const Initializer::Trail& trail) {
-                             return trail.first == trail.now;
-                           });
-    if (restarted) first_.reset();
+    corner_tracks_.Track(time, features, *camera_,
+                         AlignedRotation(*corner_tracks_.newest(), *features, *camera_));
+    if (corner_tracks_.ended()) first_.reset();
   }
   if (!detection_) {
     hint_ = Hint::kFindTarget;
@@ -186,14 +178,13 @@ std::optional<TargetStart> TargetInitializer::Track(Timestamp time,
   }
   const TargetView now{{time, features}, *detection_};
   if (!first_) {
-    corner_tracker_.Reset();
-    corner_tracker_.Track(time, features);
+    corner_tracks_.Start(time, features);
     first_ = now;
     hint_ = HintFor(TwoViewOutcome::kStill);
     return std::nullopt;
   }
   std::vector<InitialPair::Match> tracked;
-  for (const Initializer::Trail& trail : trails())
+  for (const CornerTracks::Trail& trail : trails())
     tracked.push_back({trail.first, trail.now, static_cast<std::uint8_t>(trail.level)});
   auto start = MakeTargetStart(camera_, *first_, now, tracked, options_, &hint_);
   if (start) Reset();

@@ -5,8 +5,10 @@
 #include <optional>
 #include <string>
 
+#include "engine/base/random.h"
+#include "engine/initialization/corner_tracks.h"
+#include "engine/initialization/hint.h"
 #include "engine/initialization/initial_pair.h"
-#include "engine/initialization/initializer.h"
 #include "engine/initialization/planar_target.h"
 
 namespace docent::engine {
@@ -62,7 +64,7 @@ class TargetInitializer {
   // The detection in the last frame; empty if the target was not found there.
   const std::optional<TargetDetection>& detection() const { return detection_; }
   // Corners tracked since the first view.
-  const std::vector<Initializer::Trail>& trails() const { return corner_tracker_.trails(); }
+  const std::vector<CornerTracks::Trail>& trails() const { return corner_tracks_.trails(); }
 
  private:
   std::optional<TargetDetection> DetectOrAlign(const ImageFeatures& features);
@@ -71,7 +73,7 @@ class TargetInitializer {
   TargetStartOptions options_;
   std::shared_ptr<const CameraModel> camera_;
   Random random_;
-  Initializer corner_tracker_;  // tracks corners; its two-view geometry is not used
+  CornerTracks corner_tracks_;
   std::optional<TargetView> first_;
   std::optional<TargetDetection> detection_;
   std::shared_ptr<const ImageFeatures> previous_;

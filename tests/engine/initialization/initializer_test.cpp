@@ -144,7 +144,7 @@ std::size_t CornersAtStart(const InitializerOptions& options, const cv::Mat& ima
 
 TEST(Initializer, TakesMoreCornersOfTheObjectsInAPlainScene) {
   InitializerOptions coarse;
-  coarse.plain_scene_corners = 0;
+  coarse.tracks.plain_scene_corners = 0;
   const cv::Mat object = ImageWithObject(160), furnished = ImageWithObject(480);
   EXPECT_LT(CornersAtStart(coarse, object), 100u);
   EXPECT_GT(CornersAtStart({}, object), 2 * CornersAtStart(coarse, object));
@@ -160,7 +160,7 @@ TEST(Initializer, TracksCornersToTheirTruePixels) {
                       MakeFeatures(world.Render(*Camera(), pose(i), 1.5, static_cast<std::uint64_t>(i) + 1)));
   ASSERT_GT(initializer.trails().size(), 100u);
   std::vector<double> errors;  // in pixels of the corner's level
-  for (const Initializer::Trail& trail : initializer.trails()) {
+  for (const CornerTracks::Trail& trail : initializer.trails()) {
     const auto hit = world.AtPixel(*Camera(), pose(0), trail.first.cast<double>());
     ASSERT_TRUE(hit);
     errors.push_back((*Camera()->Project(pose(7) * hit->point) - trail.now.cast<double>()).norm() /
