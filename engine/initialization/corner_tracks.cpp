@@ -3,6 +3,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <span>
+#include <utility>
 
 #include "engine/base/median.h"
 #include "engine/base/option_check.h"
@@ -15,6 +17,7 @@ namespace {
 
 constexpr float kMinCorrelation = 0.8f;
 constexpr float kMaxRoundTripPx = 0.7f;  // of the corner's level, tracked forwards and backwards
+constexpr double kFineGrid = 2;          // its density, for plain scenes
 constexpr float kMaxStepPx = 4.0f;       // of each level: how far the alignment may move from the prediction
 
 // Tracks one patch of `from` into `to`, from coarse levels to the corner's own level.
@@ -42,10 +45,11 @@ std::optional<Eigen::Vector2f> TrackPatch(const ImageFeatures& from, const Eigen
   return guess.cast<float>();
 }
 
-// The best corners of a level, at most `count`, one per grid cell so that they cover the image. density: by
-// which the edge of a cell is divided.
-std::vector<Corner> SpreadCorners(const ImageFeatures& features, std::size_t level, int count,
-                                  double density) {
+// The best corners of a level, one per grid cell so that they cover the image: at most `count` together with
+// those that are tracked, whose cells receive none. tracked: pixels of the level. density: by which the edge
+// of a cell is divided.
+std::vector<Corner> SpreadCorners(const ImageFeatures& features, std::size_t level, int count, double density,
+                                  std::span<const Eigen::Vector2d> tracked) {
   const cv::Mat& image = features.levels[level];
   const double cell = std::max(8.0, std::sqrt(static_cast<double>(image.total()) / (1.3 * count)) / density);
   const int columns = static_cast<int>(image.cols / cell) + 1, rows = static_cast<int>(image.rows / cell) + 1;
@@ -61,11 +65,16 @@ std::vector<Corner> SpreadCorners(const ImageFeatures& features, std::size_t lev
                                                 static_cast<int>(corner.x / cell))];
     if (score > place.score) place = {score, corner};
   }
+  for (const Eigen::Vector2d& pixel : tracked) {
+    const int column = std::clamp(static_cast<int>(pixel.x() / cell), 0, columns - 1),
+              row = std::clamp(static_cast<int>(pixel.y() / cell), 0, rows - 1);
+    best[static_cast<std::size_t>(row * columns + column)].score = 0;
+  }
   std::erase_if(best, [](const Best& place) { return place.score < 30.0f; });
   std::stable_sort(best.begin(), best.end(), [](const Best& a, const Best& b) { return a.score > b.score; });
   std::vector<Corner> corners;
   for (const Best& place : best) {
-    if (static_cast<int>(corners.size()) >= count) break;
+    if (static_cast<int>(corners.size() + tracked.size()) >= count) break;
     corners.push_back(place.corner);
   }
   return corners;
@@ -81,6 +90,8 @@ std::optional<std::string> CornerTracksOptions::Validate() const {
       .Ratio(min_alive_ratio, "ratio of tracked corners")
       .AtLeast(min_alive, 0, "number of tracked corners")
       .AtLeast(max_age_frames, 1, "age of the first view")
+      .Ratio(next_view_alive_ratio, "ratio of tracked corners")
+      .Within(max_views, 1, static_cast<double>(CornerTracks::kMaxViews), "number of first views")
       .fault();
 }
 
@@ -94,76 +105,160 @@ CornerTracks::CornerTracks(const CornerTracksOptions& options) : options_(Checke
 
 void CornerTracks::Reset() {
   trails_.clear();
-  first_.reset();
+  views_.clear();
   previous_.reset();
 }
 
 void CornerTracks::AddCorners(const ImageFeatures& features, double density) {
+  std::vector<Eigen::Vector2d> tracked;
   for (std::size_t level = 0; level < options_.corners.size(); ++level) {
-    for (const Corner& corner : SpreadCorners(features, level, options_.corners[level], density)) {
-      const Eigen::Vector2f pixel =
+    tracked.clear();
+    for (const Trail& trail : trails_) {
+      if (trail.level == static_cast<int>(level))
+        tracked.push_back(LevelFromLevelZero(trail.now.pixel.cast<double>(), trail.level));
+    }
+    for (const Corner& corner : SpreadCorners(features, level, options_.corners[level], density, tracked)) {
+      Trail trail;
+      trail.now.pixel =
           LevelZeroFromLevel(Eigen::Vector2d(corner.x, corner.y), static_cast<int>(level)).cast<float>();
-      trails_.push_back({pixel, pixel, static_cast<int>(level), static_cast<std::uint32_t>(trails_.size())});
+      trail.level = static_cast<int>(level);
+      trail.id = next_id_++;
+      trails_.push_back(trail);
     }
   }
 }
 
+void CornerTracks::AddView(Timestamp time, const std::shared_ptr<const ImageFeatures>& features) {
+  FirstView view;
+  view.time = time;
+  view.features = features;
+  view.slot = FreeSlot();
+  view.corners_at_start = view.alive = trails_.size();
+  for (Trail& trail : trails_) {
+    trail.views = static_cast<std::uint8_t>(trail.views | (1U << view.slot));
+    trail.first[view.slot] = {trail.now.pixel};
+  }
+  views_.push_back(std::move(view));
+}
+
+std::size_t CornerTracks::FreeSlot() const {
+  std::size_t slot = 0;
+  while (std::ranges::any_of(views_, [&](const FirstView& view) { return view.slot == slot; })) ++slot;
+  return slot;
+}
+
 void CornerTracks::Start(Timestamp time, const std::shared_ptr<const ImageFeatures>& features) {
   trails_.clear();
+  views_.clear();
   AddCorners(*features, 1);
-  if (static_cast<int>(trails_.size()) < options_.plain_scene_corners) {
+  plain_scene_ = HasFewCorners();
+  if (plain_scene_) {
     trails_.clear();
-    AddCorners(*features, 2);
+    AddCorners(*features, kFineGrid);
   }
-  trails_at_start_ = trails_.size();
-  age_frames_ = 0;
-  first_time_ = previous_time_ = time;
-  first_ = previous_ = features;
+  AddView(time, features);
+  previous_time_ = time;
+  previous_ = features;
+}
+
+void CornerTracks::TrackTrails(const ImageFeatures& features, const CameraModel& camera,
+                               const Rotation3& now_from_previous) {
+  std::erase_if(trails_, [&](Trail& trail) {
+    const auto ray = camera.Unproject(trail.now.pixel.cast<double>());
+    if (!ray) return true;
+    const auto prediction = camera.Project(now_from_previous * *ray);
+    if (!prediction || !camera.IsInside(*prediction, 6)) return true;
+    const auto now =
+        TrackPatch(*previous_, trail.now.pixel, features, prediction->cast<float>(), trail.level);
+    if (!now || !camera.IsInside(now->cast<double>(), 6)) return true;
+    const auto back = TrackPatch(features, *now, *previous_, trail.now.pixel, trail.level);
+    if (!back || (*back - trail.now.pixel).norm() > kMaxRoundTripPx * static_cast<float>(1 << trail.level))
+      return true;
+    trail.now = {*now, *now - trail.now.pixel};
+    return false;
+  });
 }
 
 void CornerTracks::Track(Timestamp time, const std::shared_ptr<const ImageFeatures>& features,
                          const CameraModel& camera, const Rotation3& now_from_previous) {
-  ++age_frames_;
   const Eigen::Vector3d rate = now_from_previous.Log() / std::max(ToSeconds(time - previous_time_), 1e-3);
-  last_rates_ = {age_frames_ == 1 ? rate : last_rates_[1], rate};
-  if (age_frames_ == 1) first_rates_ = last_rates_;
-  if (age_frames_ == 2) first_rates_[1] = rate;
-  std::erase_if(trails_, [&](Trail& trail) {
-    const auto ray = camera.Unproject(trail.now.cast<double>());
-    if (!ray) return true;
-    const auto prediction = camera.Project(now_from_previous * *ray);
-    if (!prediction || !camera.IsInside(*prediction, 6)) return true;
-    const auto now = TrackPatch(*previous_, trail.now, *features, prediction->cast<float>(), trail.level);
-    if (!now || !camera.IsInside(now->cast<double>(), 6)) return true;
-    const auto back = TrackPatch(*features, *now, *previous_, trail.now, trail.level);
-    if (!back || (*back - trail.now).norm() > kMaxRoundTripPx * static_cast<float>(1 << trail.level))
-      return true;
-    trail.step = *now - trail.now;
-    if (age_frames_ == 1) trail.first_step = trail.step;
-    trail.now = *now;
-    return false;
-  });
+  TrackTrails(*features, camera, now_from_previous);
+  last_rates_ = {views_.front().age_frames == 0 ? rate : last_rates_[1], rate};
+  for (FirstView& view : views_) {
+    view.alive = static_cast<std::size_t>(
+        std::ranges::count_if(trails_, [&](const Trail& trail) { return trail.IsIn(view.slot); }));
+    ++view.age_frames;
+    if (view.age_frames == 1) {
+      view.rates = {rate, rate};
+      for (Trail& trail : trails_) trail.first[view.slot].step = trail.now.step;
+    }
+    if (view.age_frames == 2) view.rates[1] = rate;
+  }
   previous_ = features;
   previous_time_ = time;
+  EndViews();
+  if (views_.empty()) {
+    Start(time, features);
+    return;
+  }
+  const FirstView& newest_view = views_.back();
+  const bool lost_many = static_cast<double>(newest_view.alive) <
+                         options_.next_view_alive_ratio * static_cast<double>(newest_view.corners_at_start);
+  if (!plain_scene_ || !lost_many || static_cast<int>(views_.size()) == options_.max_views) return;
+  AddCorners(*features, 1);
+  if (HasFewCorners()) AddCorners(*features, kFineGrid);
+  AddView(time, features);
 }
 
-bool CornerTracks::ended() const {
-  const bool too_few = !has_enough() || static_cast<double>(trails_.size()) <
-                                            options_.min_alive_ratio * static_cast<double>(trails_at_start_);
-  return too_few || age_frames_ > options_.max_age_frames;
+bool CornerTracks::HasFewCorners() const {
+  return static_cast<int>(trails_.size()) < options_.plain_scene_corners;
 }
 
-double CornerTracks::MedianMotionPx() const {
+bool CornerTracks::HasEnough(const FirstView& view) const {
+  return static_cast<int>(view.alive) >= options_.min_alive;
+}
+
+void CornerTracks::EndViews() {
+  std::erase_if(views_, [&](const FirstView& view) {
+    const bool too_few =
+        !HasEnough(view) || static_cast<double>(view.alive) <
+                                options_.min_alive_ratio * static_cast<double>(view.corners_at_start);
+    const bool ends = too_few || view.age_frames > options_.max_age_frames;
+    if (ends) {
+      for (Trail& trail : trails_) trail.views = static_cast<std::uint8_t>(trail.views & ~(1U << view.slot));
+    }
+    return ends;
+  });
+  std::erase_if(trails_, [](const Trail& trail) { return trail.views == 0; });
+}
+
+void CornerTracks::Matches(const FirstView& view, std::vector<InitialPair::Match>* matches,
+                           std::vector<std::uint32_t>* ids) const {
+  matches->clear();
+  ids->clear();
+  for (const Trail& trail : trails_) {
+    if (!trail.IsIn(view.slot)) continue;
+    matches->push_back(
+        {trail.first[view.slot].pixel, trail.now.pixel, static_cast<std::uint8_t>(trail.level)});
+    ids->push_back(trail.id);
+  }
+}
+
+double CornerTracks::MedianMotionPx(const FirstView& view) const {
   std::vector<double> motion;
-  motion.reserve(trails_.size());
-  for (const Trail& trail : trails_) motion.push_back((trail.now - trail.first).norm());
+  motion.reserve(view.alive);
+  for (const Trail& trail : trails_) {
+    if (trail.IsIn(view.slot)) motion.push_back((trail.now.pixel - trail.first[view.slot].pixel).norm());
+  }
   return Median(std::move(motion));
 }
 
-double CornerTracks::MedianSpeedChangePx() const {
+double CornerTracks::MedianSpeedChangePx(const FirstView& view) const {
   std::vector<double> changes;
-  changes.reserve(trails_.size());
-  for (const Trail& trail : trails_) changes.push_back((trail.step - trail.first_step).norm());
+  changes.reserve(view.alive);
+  for (const Trail& trail : trails_) {
+    if (trail.IsIn(view.slot)) changes.push_back((trail.now.step - trail.first[view.slot].step).norm());
+  }
   return Median(std::move(changes));
 }
 

@@ -12,6 +12,7 @@
 #include "engine/base/time.h"
 #include "engine/geometry/camera_model.h"
 #include "engine/geometry/rigid3.h"
+#include "engine/initialization/initial_pair.h"
 #include "engine/vision/features.h"
 
 namespace docent::engine {
@@ -23,9 +24,17 @@ struct CornerTracksOptions {
   // fewer than min_alive the search starts again: of six runs with such a recording, one had depth within
   // four seconds with the coarse grid, all with the fine one. In a furnished room, 360 corners are found.
   int plain_scene_corners = 200;
-  double min_alive_ratio = 0.3;  // of the initial corners; with fewer, a new first view is taken
-  int min_alive = 80;            // corners; with fewer, a new first view is taken
-  int max_age_frames = 240;      // a first view older than this is replaced
+  double min_alive_ratio = 0.3;  // of the corners of a first view; with fewer, it ends
+  int min_alive = 80;            // corners; with fewer, a first view ends
+  int max_age_frames = 240;      // a first view older than this ends
+  // In a plain scene, once fewer corners of the newest first view than this ratio are left, the image becomes
+  // a further first view, and corners are added where none are left. In fast motion, the corners of a first
+  // view are lost just before their parallax is significant, and with a single one it is chance whether that
+  // was a suitable image: of 60 runs with a recording of a plain scene and its variants (half of the images,
+  // half the resolution, turned, backwards), 29 % of the images had depth with one first view, 66 % with up
+  // to six. Not elsewhere: the corners that remain are the distant ones, and more of them cost time.
+  double next_view_alive_ratio = 0.85;
+  int max_views = 6;  // at most CornerTracks::kMaxViews
 
   // Describes the first invalid option in one sentence, or empty.
   std::optional<std::string> Validate() const;
@@ -34,56 +43,81 @@ struct CornerTracksOptions {
 // The rotation between two consecutive images, from the whole images; none if it is not found.
 Rotation3 AlignedRotation(const ImageFeatures& previous, const ImageFeatures& now, const CameraModel& camera);
 
-// Corners of a first view, tracked from one image to the next by their patches. Each is tracked back again,
-// and discarded where it does not return. One thread.
+// Corners that are tracked from one image to the next by their patches, since one or more first views. Each
+// is tracked back again, and discarded where it does not return. One thread.
 class CornerTracks {
  public:
-  // A tracked corner: its pixel in the first view and in the current image, level 0.
-  struct Trail {
-    Eigen::Vector2f first, now;
-    int level = 0;
-    std::uint32_t id = 0;                                                                  // ascending
-    Eigen::Vector2f first_step = Eigen::Vector2f::Zero(), step = Eigen::Vector2f::Zero();  // pixels per image
+  static constexpr std::size_t kMaxViews = 8;
+  // An image from which corners are tracked.
+  struct FirstView {
+    Timestamp time{};
+    std::shared_ptr<const ImageFeatures> features;
+    // Mean rotation rates, radians per second, of the first two intervals between images.
+    std::array<Eigen::Vector3d, 2> rates = {Eigen::Vector3d::Zero(), Eigen::Vector3d::Zero()};
+    int age_frames = 0;
+    std::size_t slot = 0;                         // differs from those of the other first views
+    std::size_t corners_at_start = 0, alive = 0;  // alive: tracked still
   };
 
   explicit CornerTracks(const CornerTracksOptions& options);
 
-  // Forgets the first view and its corners.
+  // Forgets the first views and their corners.
   void Reset();
-  // Takes the corners of a first view.
+  // Makes an image the only first view.
   void Start(Timestamp time, const std::shared_ptr<const ImageFeatures>& features);
-  // Tracks the corners into the next image. now_from_previous: predicts where they are.
+  // Tracks the corners into the next image, which becomes the only first view if all others end there, and
+  // may become a further one in a plain scene. now_from_previous: predicts where the corners are.
   void Track(Timestamp time, const std::shared_ptr<const ImageFeatures>& features, const CameraModel& camera,
              const Rotation3& now_from_previous);
 
-  bool started() const { return first_ != nullptr; }
-  // Whether too few corners are left, or the first view is too old.
-  bool ended() const;
-  bool has_enough() const { return static_cast<int>(trails_.size()) >= options_.min_alive; }
-  const std::vector<Trail>& trails() const { return trails_; }
-  int age_frames() const { return age_frames_; }  // since the first view
-  // Time of the first view; Timestamp::min() if there is none.
-  Timestamp first_time() const { return first_ ? first_time_ : Timestamp::min(); }
-  const std::shared_ptr<const ImageFeatures>& first() const { return first_; }
+  bool started() const { return !views_.empty(); }
+  // In the order of their times.
+  const std::vector<FirstView>& views() const { return views_; }
+  // Whether a first view has as many corners as it needs not to end.
+  bool HasEnough(const FirstView& view) const;
   const std::shared_ptr<const ImageFeatures>& newest() const { return previous_; }
-  // Mean rotation rates, radians per second: of the first two intervals between images, and of the last two.
-  const std::array<Eigen::Vector3d, 2>& first_rates() const { return first_rates_; }
+  // Of the last two intervals between images.
   const std::array<Eigen::Vector3d, 2>& last_rates() const { return last_rates_; }
-  // Median distance of the corners from their first pixels.
-  double MedianMotionPx() const;
-  // Median difference of the image speed between the current and the first view, pixels per image.
-  double MedianSpeedChangePx() const;
+
+  // The corners of a first view that are tracked still: in it and in the current image, with ids that
+  // identify them in other calls, ascending.
+  void Matches(const FirstView& view, std::vector<InitialPair::Match>* matches,
+               std::vector<std::uint32_t>* ids) const;
+  // Median distance of the corners from their pixels in a first view.
+  double MedianMotionPx(const FirstView& view) const;
+  // Median difference of the image speed between the current image and a first view, pixels per image.
+  double MedianSpeedChangePx(const FirstView& view) const;
 
  private:
+  // A corner in an image: its pixel of level 0, and its motion there in pixels per image.
+  struct Seen {
+    Eigen::Vector2f pixel = Eigen::Vector2f::Zero(), step = Eigen::Vector2f::Zero();
+  };
+  struct Trail {
+    Seen now;
+    int level = 0;
+    std::uint32_t id = 0;
+    std::uint8_t views = 0;             // bits of the slots of the first views that contain it
+    std::array<Seen, kMaxViews> first;  // by slot
+    bool IsIn(std::size_t slot) const { return ((views >> slot) & 1) != 0; }
+  };
+  void AddView(Timestamp time, const std::shared_ptr<const ImageFeatures>& features);
   void AddCorners(const ImageFeatures& features, double density);
+  bool HasFewCorners() const;
+  void TrackTrails(const ImageFeatures& features, const CameraModel& camera,
+                   const Rotation3& now_from_previous);
+  // Removes first views with too few corners or of too great an age, and corners without a first view.
+  void EndViews();
+  std::size_t FreeSlot() const;
 
   CornerTracksOptions options_;
-  std::vector<Trail> trails_;
-  std::size_t trails_at_start_ = 0;
-  int age_frames_ = 0;
-  std::array<Eigen::Vector3d, 2> first_rates_, last_rates_;
-  Timestamp first_time_{}, previous_time_{};
-  std::shared_ptr<const ImageFeatures> first_, previous_;
+  std::vector<Trail> trails_;  // in the order of their ids
+  std::vector<FirstView> views_;
+  bool plain_scene_ = false;  // the first image had few corners
+  std::uint32_t next_id_ = 0;
+  std::array<Eigen::Vector3d, 2> last_rates_ = {Eigen::Vector3d::Zero(), Eigen::Vector3d::Zero()};
+  Timestamp previous_time_{};
+  std::shared_ptr<const ImageFeatures> previous_;
 };
 
 }  // namespace docent::engine

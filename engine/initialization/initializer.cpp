@@ -2,6 +2,7 @@
 #include "engine/initialization/initializer.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 #include "engine/base/option_check.h"
@@ -50,7 +51,7 @@ Initializer::Initializer(const InitializerOptions& options, std::shared_ptr<cons
       camera_(std::move(camera)),
       random_(seed),
       tracks_(options.tracks),
-      confirmation_(options.confirmation),
+      confirmations_(CornerTracks::kMaxViews, StartConfirmation(options.confirmation)),
       views_confirmation_(options.confirmation) {}
 
 void Initializer::SetCamera(std::shared_ptr<const CameraModel> camera) {
@@ -60,7 +61,7 @@ void Initializer::SetCamera(std::shared_ptr<const CameraModel> camera) {
 
 void Initializer::Reset() {
   tracks_.Reset();
-  confirmation_.Reset();
+  for (StartConfirmation& confirmation : confirmations_) confirmation.Reset();
   hint_ = Hint::kNone;
   progress_ = 0;
 }
@@ -70,32 +71,32 @@ void Initializer::UpdateProgress(double progress) {
   progress_ = std::max(progress, kKept * progress_);
 }
 
-void Initializer::Start(Timestamp time, const std::shared_ptr<const ImageFeatures>& features) {
-  confirmation_.Reset();
-  tracks_.Start(time, features);
-  hint_ = tracks_.has_enough() ? Hint::kMoveSideways : Hint::kStartWhereThereIsDetail;
-}
-
 std::optional<InitialPair> Initializer::Track(Timestamp time,
                                               const std::shared_ptr<const ImageFeatures>& features) {
-  if (!tracks_.started()) {
-    Start(time, features);
-    return std::nullopt;
+  if (tracks_.started()) {
+    tracks_.Track(time, features, *camera_, AlignedRotation(*tracks_.newest(), *features, *camera_));
+  } else {
+    tracks_.Start(time, features);
   }
-  tracks_.Track(time, features, *camera_, AlignedRotation(*tracks_.newest(), *features, *camera_));
-  if (tracks_.ended()) {
-    Start(time, features);
-    return std::nullopt;
+  if (tracks_.views().front().time == time) {
+    const bool enough = tracks_.HasEnough(tracks_.views().front());
+    hint_ = enough ? Hint::kMoveSideways : Hint::kStartWhereThereIsDetail;
   }
-  if (tracks_.age_frames() % options_.attempt_interval != 0) return std::nullopt;
-  const double motion_px = tracks_.MedianMotionPx();
-  const double min_motion_px = options_.min_motion_px * camera_->width_px() / 640.0;
-  if (motion_px < min_motion_px) {
-    hint_ = HintFor(TwoViewOutcome::kStill);
-    UpdateProgress(kMotionShare * motion_px / min_motion_px);
-    return std::nullopt;
+  Hint of_oldest = hint_;  // One for each first view would confuse a person.
+  double progress = -1;
+  for (const CornerTracks::FirstView& first : tracks_.views()) {
+    if (first.age_frames == 0) confirmations_[first.slot].Reset();
+    if (first.age_frames == 0 || first.age_frames % options_.attempt_interval != 0) continue;
+    if (auto pair = Attempt(first, time, features)) {
+      Reset();
+      return pair;
+    }
+    if (&first == &tracks_.views().front()) of_oldest = hint_;
+    progress = std::max(progress, attempt_progress_);
   }
-  return Attempt(time, features);
+  hint_ = of_oldest;
+  if (progress >= 0) UpdateProgress(progress);
+  return std::nullopt;
 }
 
 std::shared_ptr<const CameraModel> Initializer::ImageCamera(const Eigen::Vector3d& newest,
@@ -105,26 +106,30 @@ std::shared_ptr<const CameraModel> Initializer::ImageCamera(const Eigen::Vector3
   return std::make_shared<CameraModel>(CameraModel::WithReadout(camera_, {rate, readout_s_}));
 }
 
-std::optional<InitialPair> Initializer::Attempt(Timestamp time,
+std::optional<InitialPair> Initializer::Attempt(const CornerTracks::FirstView& first, Timestamp time,
                                                 const std::shared_ptr<const ImageFeatures>& features) {
+  const double motion_px = tracks_.MedianMotionPx(first),
+               min_motion_px = options_.min_motion_px * camera_->width_px() / 640.0;
+  if (motion_px < min_motion_px) {
+    hint_ = HintFor(TwoViewOutcome::kStill);
+    attempt_progress_ = kMotionShare * motion_px / min_motion_px;
+    return std::nullopt;
+  }
   std::vector<InitialPair::Match> matches;
   std::vector<std::uint32_t> ids;
-  for (const CornerTracks::Trail& trail : tracks_.trails()) {
-    matches.push_back({trail.first, trail.now, static_cast<std::uint8_t>(trail.level)});
-    ids.push_back(trail.id);
-  }
-  const auto &first_rates = tracks_.first_rates(), &last_rates = tracks_.last_rates();
-  auto pair = Solve({tracks_.first_time(), tracks_.first(), ImageCamera(first_rates[0], first_rates[1])},
-                    {time, features, ImageCamera(last_rates[1], last_rates[0])}, std::move(matches), ids,
-                    tracks_.MedianSpeedChangePx(), &confirmation_);
-  if (pair) Reset();
-  return pair;
+  tracks_.Matches(first, &matches, &ids);
+  const std::array<Eigen::Vector3d, 2>& last_rates = tracks_.last_rates();
+  return Solve({first.time, first.features, ImageCamera(first.rates[0], first.rates[1])},
+               {time, features, ImageCamera(last_rates[1], last_rates[0])}, std::move(matches), ids,
+               tracks_.MedianSpeedChangePx(first), &confirmations_[first.slot]);
 }
 
 std::optional<InitialPair> Initializer::TryViews(const InitialPair::View& a, const InitialPair::View& b,
                                                  std::vector<InitialPair::Match> matches,
                                                  std::span<const std::uint32_t> ids, double speed_change_px) {
-  return Solve(a, b, std::move(matches), ids, speed_change_px, &views_confirmation_);
+  auto pair = Solve(a, b, std::move(matches), ids, speed_change_px, &views_confirmation_);
+  UpdateProgress(attempt_progress_);
+  return pair;
 }
 
 bool Initializer::HasDepthWithAnyReadout(const InitialPair::View& a, const InitialPair::View& b,
@@ -173,8 +178,8 @@ std::optional<InitialPair> Initializer::Solve(const InitialPair::View& a, const 
   if (HasDepth(pair.geometry) && any_readout && !HasDepthWithAnyReadout(a, b, pair.matches, options))
     pair.geometry.outcome = TwoViewOutcome::kTooLittleParallax;
   hint_ = HintFor(pair.geometry.outcome);
-  UpdateProgress(kMotionShare + kParallaxShare * ParallaxProgress(pair.geometry, options) +
-                 (1 - kMotionShare - kParallaxShare) * confirmation->GrowthProgress(pair.geometry));
+  attempt_progress_ = kMotionShare + kParallaxShare * ParallaxProgress(pair.geometry, options) +
+                      (1 - kMotionShare - kParallaxShare) * confirmation->GrowthProgress(pair.geometry);
   awaits_confirmation_ = false;
   if (!HasDepth(pair.geometry)) return std::nullopt;
   if (!confirmation->Confirm(a.time, kept, pair.geometry)) {

@@ -32,8 +32,9 @@ struct InitializerOptions {
 };
 
 // Initializes a map from two views: tracks corners from a first view through the images and estimates the
-// two-view geometry until it is reliable (ptamm §2.3) and a third view has confirmed it. Until then hint()
-// says what is missing. One per camera, on the tracker's thread.
+// two-view geometry until it is reliable (ptamm §2.3) and a third view has confirmed it. In a plain scene,
+// several first views are tried (CornerTracks). Until then hint() says what is missing. One per camera, on
+// the tracker's thread.
 class Initializer {
  public:
   Initializer(const InitializerOptions& options, std::shared_ptr<const CameraModel> camera,
@@ -58,18 +59,17 @@ class Initializer {
   // Whether the views that were tried last have depth, which a third view has yet to confirm.
   bool awaits_confirmation() const { return awaits_confirmation_; }
 
-  // Time of the first view; Timestamp::min() if there is none.
-  Timestamp first_time() const { return tracks_.first_time(); }
+  // The corners that are tracked, and their first views.
+  const CornerTracks& tracks() const { return tracks_; }
   // Why there is no map yet; kNone right after Reset().
   Hint hint() const { return hint_; }
   // How close the camera has come to a map, from 0 (it has not moved) to 1, for a person who waits for it. It
   // falls slowly when an attempt is worse than the one before, so that it does not flicker.
   double progress() const { return progress_; }
-  const std::vector<CornerTracks::Trail>& trails() const { return tracks_.trails(); }
 
  private:
-  void Start(Timestamp time, const std::shared_ptr<const ImageFeatures>& features);
-  std::optional<InitialPair> Attempt(Timestamp time, const std::shared_ptr<const ImageFeatures>& features);
+  std::optional<InitialPair> Attempt(const CornerTracks::FirstView& first, Timestamp time,
+                                     const std::shared_ptr<const ImageFeatures>& features);
   std::optional<InitialPair> Solve(const InitialPair::View& a, const InitialPair::View& b,
                                    std::vector<InitialPair::Match> matches,
                                    std::span<const std::uint32_t> ids, double speed_change_px,
@@ -87,10 +87,11 @@ class Initializer {
   std::shared_ptr<const CameraModel> camera_;
   Random random_;
   CornerTracks tracks_;
-  StartConfirmation confirmation_, views_confirmation_;
+  std::vector<StartConfirmation> confirmations_;  // by slot of the first view
+  StartConfirmation views_confirmation_;
   Eigen::Vector2d readout_s_ = Eigen::Vector2d::Zero();
   Hint hint_ = Hint::kNone;
-  double progress_ = 0;
+  double progress_ = 0, attempt_progress_ = 0;  // attempt_progress_: of the last attempt alone
   bool awaits_confirmation_ = false;
 };
 

@@ -20,6 +20,7 @@ CornerTracksOptions TracksBesideTheTarget() {
   CornerTracksOptions options;
   options.max_age_frames = std::numeric_limits<int>::max();
   options.min_alive = 0;  // the points of the target alone suffice
+  options.max_views = 1;
   return options;
 }
 
@@ -170,7 +171,7 @@ std::optional<TargetStart> TargetInitializer::Track(Timestamp time,
   if (first_) {
     corner_tracks_.Track(time, features, *camera_,
                          AlignedRotation(*corner_tracks_.newest(), *features, *camera_));
-    if (corner_tracks_.ended()) first_.reset();
+    if (corner_tracks_.views().front().time != first_->view.time) first_.reset();
   }
   if (!detection_) {
     hint_ = Hint::kFindTarget;
@@ -184,8 +185,8 @@ std::optional<TargetStart> TargetInitializer::Track(Timestamp time,
     return std::nullopt;
   }
   std::vector<InitialPair::Match> tracked;
-  for (const CornerTracks::Trail& trail : trails())
-    tracked.push_back({trail.first, trail.now, static_cast<std::uint8_t>(trail.level)});
+  std::vector<std::uint32_t> ids;
+  corner_tracks_.Matches(corner_tracks_.views().front(), &tracked, &ids);
   auto start = MakeTargetStart(camera_, *first_, now, tracked, options_, &hint_);
   if (start) Reset();
   return start;

@@ -63,8 +63,6 @@ class TargetInitializer {
   Hint hint() const { return hint_; }
   // The detection in the last frame; empty if the target was not found there.
   const std::optional<TargetDetection>& detection() const { return detection_; }
-  // Corners tracked since the first view.
-  const std::vector<CornerTracks::Trail>& trails() const { return corner_tracks_.trails(); }
 
  private:
   std::optional<TargetDetection> DetectOrAlign(const ImageFeatures& features);

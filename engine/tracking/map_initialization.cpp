@@ -59,10 +59,29 @@ void MapInitialization::SetCamera(std::shared_ptr<const CameraModel> camera, Ran
 void MapInitialization::ResetViews() {
   initializer_.Reset();
   if (target_initializer_) target_initializer_->Reset();
+  first_views_from_map_.clear();
 }
 
-Timestamp MapInitialization::FirstViewTime() const {
-  return target_initializer_ ? target_initializer_->first_time() : initializer_.first_time();
+Timestamp MapInitialization::OldestFirstView() const {
+  if (target_initializer_) return target_initializer_->first_time();
+  const auto& views = initializer_.tracks().views();
+  return views.empty() ? Timestamp::min() : views.front().time;
+}
+
+Timestamp MapInitialization::NewestFirstView() const {
+  if (target_initializer_) return target_initializer_->first_time();
+  const auto& views = initializer_.tracks().views();
+  return views.empty() ? Timestamp::min() : views.back().time;
+}
+
+Rigid3 MapInitialization::FirstViewFromMap(Timestamp time) const {
+  const auto view = std::ranges::find(first_views_from_map_, time, &std::pair<Timestamp, Rigid3>::first);
+  return view != first_views_from_map_.end() ? view->second : Rigid3();
+}
+
+void MapInitialization::RememberFirstView(Timestamp time, const Rigid3& camera_from_map) {
+  std::erase_if(first_views_from_map_, [&](const auto& view) { return view.first < OldestFirstView(); });
+  first_views_from_map_.emplace_back(time, camera_from_map);
 }
 
 void MapInitialization::Begin() {
@@ -85,8 +104,11 @@ void MapInitialization::PairFailed() {
 
 void MapInitialization::FirstIsMapped(Timestamp time, const Rigid3& camera_from_map) {
   // The keypoint tracks of the initializer must start in a frame with a known pose.
-  first_view_from_map_ = camera_from_map;
-  if (FirstViewTime() != time) ResetViews();
+  if (OldestFirstView() != time) {
+    ResetViews();
+    return;
+  }
+  first_views_from_map_.assign(1, {time, camera_from_map});
 }
 
 void MapInitialization::AddKeyFrame(Timestamp time, const Eigen::Vector3d& rotation_rate) {
@@ -122,14 +144,14 @@ void MapInitialization::Search(const CameraImage& image, const MapSnapshot* map,
   const bool directions = options_.hybrid && options_.build_maps;
   if (!map && directions) ResetViews();  // the map's first image is also the initializer's first view
   pair_ = TrackViews(image, &out->hint);
-  if (pair_) pair_->a_from_map = first_view_from_map_;
+  if (pair_) pair_->a_from_map = FirstViewFromMap(pair_->a.time);
   if (!pair_ && map && posed && directions && !target_initializer_)
     pair_ = TryPanoramaViews(image, *map, panorama, rotation_rate, *out);
   if (!pair_ && map && posed && directions && !target_initializer_)
     pair_ = TryWideBaseline(image, rotation_rate, *out);
   if (pair_) phase_ = Phase::kPairGiven;
   if (!target_initializer_) out->initialization_progress = pair_ ? 1 : initializer_.progress();
-  if (FirstViewTime() == image.time) first_view_from_map_ = posed ? out->camera_from_map : Rigid3();
+  if (NewestFirstView() == image.time) RememberFirstView(image.time, posed ? out->camera_from_map : Rigid3());
 }
 
 // The panorama keyframe with the largest parallax to the image: the largest median distance of its points

@@ -63,7 +63,11 @@ class MapInitialization {
 
  private:
   void ResetViews();
-  Timestamp FirstViewTime() const;
+  // Times of the initializer's first views; Timestamp::min() without one.
+  Timestamp OldestFirstView() const;
+  Timestamp NewestFirstView() const;
+  Rigid3 FirstViewFromMap(Timestamp time) const;
+  void RememberFirstView(Timestamp time, const Rigid3& camera_from_map);
   // Runs the initializer in use: two arbitrary views or a planar target.
   std::optional<InitialPair> TrackViews(const CameraImage& image, Hint* hint);
   // An initial pair of a keyframe of the panorama map and the present frame, matched by infinite points.
@@ -82,7 +86,8 @@ class MapInitialization {
   WideBaselineViews wide_views_;
   std::optional<TargetInitializer> target_initializer_;
   Phase phase_ = Phase::kOff;
-  Rigid3 first_view_from_map_;  // pose of the initializer's first view
+  // Poses of the initializer's first views, in the order of their times.
+  std::vector<std::pair<Timestamp, Rigid3>> first_views_from_map_;
   std::optional<InitialPair> pair_;
   std::vector<std::pair<Timestamp, Eigen::Vector3d>> keyframe_rotation_rates_;  // of the panorama keyframes
   int frames_since_views_ = 0;              // since TryPanoramaViews last ran
