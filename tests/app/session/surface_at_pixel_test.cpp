@@ -77,8 +77,9 @@ std::vector<double> FoundDistances(int* asked) {
   return ratios;
 }
 
-// Measured in four simulated scenes at 6,025 random pixels: 8.5 to 13 % are wrong by more than a tenth, in
-// the median 0.4 to 0.5 %. Where the images of keyframes tell the distance, 1.5 to 3.5 % are.
+// Measured in four simulated scenes at 6,025 random pixels: 6 to 11 % are wrong by more than a tenth, in the
+// median 0.3 to 0.4 %. Where the images of keyframes tell the distance, at 80 to 90 % of the pixels, 1.5 to 3
+// % are; elsewhere, where only map points do, 37 to 48 %.
 TEST(SurfaceAtPixel, IsWithinATenthOfTheTrueDistanceAtMostPixels) {
   int asked = 0, within = 0;
   const std::vector<double> ratios = FoundDistances(&asked);
@@ -87,7 +88,7 @@ TEST(SurfaceAtPixel, IsWithinATenthOfTheTrueDistanceAtMostPixels) {
   for (const double ratio : ratios) within += std::abs(ratio - 1) < 0.1;
   RecordProperty("asked", asked);
   RecordProperty("within_a_tenth", within);
-  EXPECT_GE(within, 0.8 * static_cast<double>(ratios.size()));
+  EXPECT_GE(within, 0.85 * static_cast<double>(ratios.size()));
 }
 
 }  // namespace
