@@ -50,18 +50,22 @@ TEST(CornerTracks, TakeMoreCornersOfTheObjectsInAPlainScene) {
   EXPECT_EQ(CornersAtStart({}, furnished), CornersAtStart(coarse, furnished));
 }
 
+// The next image of a camera with 30 images per second.
+void Show(const cv::Mat& image, int number, CornerTracks* tracks) {
+  const Timestamp time = FromSeconds(number / 30.0);
+  const auto features = MakeFeatures(image);
+  if (!tracks->started()) {
+    tracks->Start(time, features);
+  } else {
+    tracks->Track(time, features, *Camera(), AlignedRotation(*tracks->newest(), *features, *Camera()));
+  }
+}
+
 // Tracks the corners in images of a camera with these poses.
 CornerTracks Follow(const RenderedWorld& world, const std::vector<Rigid3>& poses) {
   CornerTracks tracks({});
-  for (std::size_t i = 0; i < poses.size(); ++i) {
-    const Timestamp time = FromSeconds(static_cast<double>(i) / 30);
-    const auto features = MakeFeatures(world.Render(*Camera(), poses[i], 1.5, i + 1));
-    if (i == 0) {
-      tracks.Start(time, features);
-    } else {
-      tracks.Track(time, features, *Camera(), AlignedRotation(*tracks.newest(), *features, *Camera()));
-    }
-  }
+  for (std::size_t i = 0; i < poses.size(); ++i)
+    Show(world.Render(*Camera(), poses[i], 1.5, i + 1), static_cast<int>(i), &tracks);
   return tracks;
 }
 
@@ -98,15 +102,7 @@ TEST(CornerTracks, HaveOneFirstViewInAFurnishedRoomEvenIfHalfOfTheCornersAreLost
 constexpr int kStep_px = 6;  // per image
 CornerTracks FollowObject(const CornerTracksOptions& options, int images, int step_px = kStep_px) {
   CornerTracks tracks(options);
-  for (int i = 0; i < images; ++i) {
-    const Timestamp time = FromSeconds(i / 30.0);
-    const auto features = MakeFeatures(ImageWithObject(kObject_px, 130 - step_px * i));
-    if (i == 0) {
-      tracks.Start(time, features);
-    } else {
-      tracks.Track(time, features, *Camera(), AlignedRotation(*tracks.newest(), *features, *Camera()));
-    }
-  }
+  for (int i = 0; i < images; ++i) Show(ImageWithObject(kObject_px, 130 - step_px * i), i, &tracks);
   return tracks;
 }
 
