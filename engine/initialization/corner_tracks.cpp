@@ -123,6 +123,7 @@ void CornerTracks::AddCorners(const ImageFeatures& features, double density) {
           LevelZeroFromLevel(Eigen::Vector2d(corner.x, corner.y), static_cast<int>(level)).cast<float>();
       trail.level = static_cast<int>(level);
       trail.id = next_id_++;
+      trail.pixels[image_ % kRememberedImages] = trail.now.pixel;
       trails_.push_back(trail);
     }
   }
@@ -150,6 +151,7 @@ std::size_t CornerTracks::FreeSlot() const {
 void CornerTracks::Start(Timestamp time, const std::shared_ptr<const ImageFeatures>& features) {
   trails_.clear();
   views_.clear();
+  images_[++image_ % kRememberedImages] = {time, Rotation3()};
   AddCorners(*features, 1);
   plain_scene_ = HasFewCorners();
   if (plain_scene_) {
@@ -175,6 +177,7 @@ void CornerTracks::TrackTrails(const ImageFeatures& features, const CameraModel&
     if (!back || (*back - trail.now.pixel).norm() > kMaxRoundTripPx * static_cast<float>(1 << trail.level))
       return true;
     trail.now = {*now, *now - trail.now.pixel};
+    trail.pixels[image_ % kRememberedImages] = *now;
     return false;
   });
 }
@@ -182,6 +185,7 @@ void CornerTracks::TrackTrails(const ImageFeatures& features, const CameraModel&
 void CornerTracks::Track(Timestamp time, const std::shared_ptr<const ImageFeatures>& features,
                          const CameraModel& camera, const Rotation3& now_from_previous) {
   const Eigen::Vector3d rate = now_from_previous.Log() / std::max(ToSeconds(time - previous_time_), 1e-3);
+  images_[++image_ % kRememberedImages] = {time, now_from_previous};
   TrackTrails(*features, camera, now_from_previous);
   last_rates_ = {views_.front().age_frames == 0 ? rate : last_rates_[1], rate};
   for (FirstView& view : views_) {
@@ -242,6 +246,22 @@ void CornerTracks::Matches(const FirstView& view, std::vector<InitialPair::Match
         {trail.first[view.slot].pixel, trail.now.pixel, static_cast<std::uint8_t>(trail.level)});
     ids->push_back(trail.id);
   }
+}
+
+CornerSequence CornerTracks::Sequence(const FirstView& view) const {
+  const auto count = std::min(kRememberedImages, static_cast<std::uint32_t>(view.age_frames) + 1);
+  CornerSequence sequence;
+  for (std::uint32_t i = image_ - count + 1; i != image_ + 1; ++i)
+    sequence.images.push_back(images_[i % kRememberedImages]);
+  for (const Trail& trail : trails_) {
+    if (!trail.IsIn(view.slot)) continue;
+    CornerSequence::Corner corner;
+    corner.level = static_cast<std::uint8_t>(trail.level);
+    for (std::uint32_t i = image_ - count + 1; i != image_ + 1; ++i)
+      corner.pixels.push_back(trail.pixels[i % kRememberedImages]);
+    sequence.corners.push_back(std::move(corner));
+  }
+  return sequence;
 }
 
 double CornerTracks::MedianMotionPx(const FirstView& view) const {

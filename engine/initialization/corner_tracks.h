@@ -13,6 +13,7 @@
 #include "engine/geometry/camera_model.h"
 #include "engine/geometry/rigid3.h"
 #include "engine/initialization/initial_pair.h"
+#include "engine/initialization/track_readout.h"
 #include "engine/vision/features.h"
 
 namespace docent::engine {
@@ -48,6 +49,7 @@ Rotation3 AlignedRotation(const ImageFeatures& previous, const ImageFeatures& no
 class CornerTracks {
  public:
   static constexpr std::size_t kMaxViews = 8;
+  static constexpr std::uint32_t kRememberedImages = 32;  // a second at 30 Hz
   // An image from which corners are tracked.
   struct FirstView {
     Timestamp time{};
@@ -83,6 +85,9 @@ class CornerTracks {
   // identify them in other calls, ascending.
   void Matches(const FirstView& view, std::vector<InitialPair::Match>* matches,
                std::vector<std::uint32_t>* ids) const;
+  // The corners of a first view that are tracked still, in all images since then, or in the last ones that
+  // are remembered.
+  CornerSequence Sequence(const FirstView& view) const;
   // Median distance of the corners from their pixels in a first view.
   double MedianMotionPx(const FirstView& view) const;
   // Median difference of the image speed between the current image and a first view, pixels per image.
@@ -99,6 +104,7 @@ class CornerTracks {
     std::uint32_t id = 0;
     std::uint8_t views = 0;             // bits of the slots of the first views that contain it
     std::array<Seen, kMaxViews> first;  // by slot
+    std::array<Eigen::Vector2f, kRememberedImages> pixels;  // by number of the image, modulo
     bool IsIn(std::size_t slot) const { return ((views >> slot) & 1) != 0; }
   };
   void AddView(Timestamp time, const std::shared_ptr<const ImageFeatures>& features);
@@ -115,6 +121,8 @@ class CornerTracks {
   std::vector<FirstView> views_;
   bool plain_scene_ = false;  // the first image had few corners
   std::uint32_t next_id_ = 0;
+  std::uint32_t image_ = 0;                                      // number of the current image
+  std::array<CornerSequence::Image, kRememberedImages> images_;  // by number, modulo
   std::array<Eigen::Vector3d, 2> last_rates_ = {Eigen::Vector3d::Zero(), Eigen::Vector3d::Zero()};
   Timestamp previous_time_{};
   std::shared_ptr<const ImageFeatures> previous_;

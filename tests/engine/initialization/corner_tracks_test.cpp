@@ -144,5 +144,31 @@ TEST(CornerTracks, StartAgainWhereTooFewCornersAreLeft) {
   EXPECT_GT(tracks.views().front().time, FromSeconds(0.5));
 }
 
+TEST(CornerTracks, RememberTheirPixelsInTheLastImages) {
+  const RenderedWorld world = RenderedWorld::Room(51);
+  CornerTracks tracks({});
+  const int last = static_cast<int>(CornerTracks::kRememberedImages) + 3;
+  std::vector<InitialPair::Match> matches;
+  std::vector<std::uint32_t> ids;
+  for (int i = 0; i <= last; ++i) {
+    Show(world.Render(*Camera(), CameraAt({0.001 * i, 0, 0}), 1.5, 1), i, &tracks);
+    const CornerSequence sequence = tracks.Sequence(tracks.views().front());
+    tracks.Matches(tracks.views().front(), &matches, &ids);
+    const auto count =
+        std::min<std::size_t>(static_cast<std::size_t>(i) + 1, CornerTracks::kRememberedImages);
+    ASSERT_EQ(sequence.images.size(), count);
+    EXPECT_EQ(sequence.images.back().time, FromSeconds(i / 30.0));
+    EXPECT_EQ(sequence.images.front().time, FromSeconds((i + 1 - static_cast<int>(count)) / 30.0));
+    ASSERT_EQ(sequence.corners.size(), matches.size());
+    for (std::size_t c = 0; c < matches.size(); ++c) {
+      ASSERT_EQ(sequence.corners[c].pixels.size(), count);
+      EXPECT_EQ(sequence.corners[c].pixels.back(), matches[c].pixel_b);
+      if (static_cast<int>(count) == i + 1) {
+        EXPECT_EQ(sequence.corners[c].pixels.front(), matches[c].pixel_a);
+      }
+    }
+  }
+}
+
 }  // namespace
 }  // namespace docent::engine

@@ -1,0 +1,429 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "engine/initialization/track_readout.h"
+
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include "engine/base/median.h"
+#include "engine/base/option_check.h"
+
+namespace docent::engine {
+
+namespace {
+
+using Twist = Eigen::Matrix<double, 6, 1>;
+
+// Errors of the calibration: of the focal length, the aspect ratio, the skew, the principal point (2), the
+// radial and the tangential (2) distortion, all as by Brown (1966). While the camera moves uniformly, a
+// rolling shutter looks like some of them.
+constexpr Eigen::Index kLens = 8, kShared = kLens + 2;  // with both axes of the readout time
+using Lens = Eigen::Matrix<double, kLens, 1>;
+using ByLens = Eigen::Matrix<double, 2, kLens>;
+using ByShared = Eigen::Matrix<double, 2, kShared>;
+
+// Derivatives of an image point, in focal lengths from the principal point.
+ByLens LensDerivatives(const Eigen::Vector2d& u) {
+  const double x = u.x(), y = u.y(), r2 = u.squaredNorm();
+  ByLens result;
+  result << x, x, y, 1, 0, x * r2, 2 * x * y, r2 + 2 * x * x,  //
+      y, -y, 0, 0, 1, y * r2, r2 + 2 * y * y, 2 * x * y;
+  return result;
+}
+
+// Standard deviations of what a calibration leaves, in focal lengths where they are lengths: a focal length
+// is wrong by up to a hundredth.
+constexpr double kFocalSigma = 0.01, kAspectSigma = 0.003, kSkewSigma = 0.003, kCenterSigma = 0.01,
+                 kRadialSigma = 0.02, kTangentialSigma = 0.002;
+constexpr double kHuberFactor = 1.345;  // times sigma: 95 % efficiency under Gaussian noise
+// Of the median distance. Weak: it only fixes the scale and keeps corners whose distance is not observable.
+constexpr double kInverseDistanceSigma = 2, kMinInverseDistance = 0.02, kMaxInverseDistance = 50;
+
+// Poses, inverse distances and the readout time of a CornerSequence. Each corner lies on the ray of its pixel
+// in the first image. The unit of length is the median distance of the corners.
+class TrackBundle {
+ public:
+  TrackBundle(const TrackReadoutOptions& options, const CameraModel& camera, const CornerSequence& sequence)
+      : options_(options), camera_(camera), motions_(sequence.images.size()) {
+    state_.poses.resize(sequence.images.size());
+    for (const CornerSequence::Image& image : sequence.images) {
+      const std::size_t k = times_s_.size();
+      times_s_.push_back(ToSeconds(image.time - sequence.images.front().time));
+      if (k > 0) state_.poses[k].rotation = image.now_from_previous * state_.poses[k - 1].rotation;
+    }
+    const auto most = static_cast<std::size_t>(options.max_corners);
+    const std::size_t stride = (sequence.corners.size() + most - 1) / most;
+    for (std::size_t i = 0; i < sequence.corners.size(); i += stride) {
+      const CornerSequence::Corner& corner = sequence.corners[i];
+      const auto ray = camera.Unproject(corner.pixels.front().cast<double>());
+      if (ray && ray->z() > 0)
+        corners_.push_back(
+            {&corner, *ray / ray->z(), LensDerivatives(ImagePoint(corner.pixels.front().cast<double>()))});
+    }
+    Eigen::Matrix<double, kShared, 1> sigmas;
+    sigmas << kFocalSigma, kAspectSigma, kSkewSigma, kCenterSigma, kCenterSigma, kRadialSigma,
+        kTangentialSigma, kTangentialSigma, options.prior_sigma_s, options.prior_sigma_s;
+    prior_ = sigmas.cwiseAbs2().cwiseInverse();
+    state_.inverse_distances.assign(corners_.size(), 1.0);
+    for (std::size_t k = 0; k < state_.poses.size(); ++k) weights_.push_back(WeightsOf(k));
+  }
+
+  std::size_t corners() const { return corners_.size(); }
+  double sigma_px() const { return sigma_px_; }
+  const Eigen::Vector2d& readout_s() const { return state_.readout_s; }
+
+  // Levenberg-Marquardt steps, with the readout time of one axis, or with a fixed one.
+  void Adjust(std::optional<Eigen::Index> axis, int iterations) {
+    constexpr double kNegligible = 1e-3, kMaxDamping = 10;
+    Linearize();
+    double damping = 1e-3;
+    for (int i = 0; i < iterations && damping < kMaxDamping; ++i) {
+      const double sigma = RobustSigma(), before = Cost(sigma);
+      Reduce(sigma);
+      const State state = state_;
+      Step(axis, damping);
+      Linearize();
+      const double after = Cost(sigma);
+      if (!(after < before)) {
+        state_ = state;
+        Linearize();
+        damping *= 10;
+        continue;
+      }
+      if (axis && before - after < kNegligible * std::max(1.0, after)) return;
+      damping = std::max(1e-6, 0.1 * damping);
+    }
+  }
+  // The best readout time of each axis and its standard deviation, near the present state and with the other
+  // one fixed.
+  struct AxisEstimates {
+    Eigen::Vector2d readout_s, sigma_s;
+  };
+  AxisEstimates Axes() {
+    Reduce(RobustSigma());
+    const Eigen::Index poses = matrix_.rows() - 2;
+    const Eigen::LDLT<Eigen::MatrixXd, Eigen::Lower> factored(
+        Eigen::MatrixXd(matrix_.topLeftCorner(poses, poses)));
+    const Eigen::MatrixXd coupling = matrix_.bottomLeftCorner(2, poses).transpose();
+    const Eigen::MatrixXd solved = factored.solve(coupling);
+    const Eigen::Matrix2d information = matrix_.bottomRightCorner<2, 2>() - coupling.transpose() * solved;
+    const Eigen::Vector2d gradient = gradient_.tail<2>() - solved.transpose() * gradient_.head(poses);
+    return {state_.readout_s - gradient.cwiseQuotient(information.diagonal()),
+            information.diagonal().cwiseSqrt().cwiseInverse()};
+  }
+  // As in ReadoutMotion.
+  std::vector<Eigen::Vector3d> RotationRates() {
+    std::vector<Eigen::Vector3d> rates;
+    for (const Twist& motion : motions_)
+      rates.push_back(motion.tail<3>() + Eigen::Vector3d(-motion[1], motion[0], 0));
+    return rates;
+  }
+
+ private:
+  struct Corner {
+    const CornerSequence::Corner* seen;
+    Eigen::Vector3d ray;  // in the first image, third coordinate 1
+    ByLens ray_by_lens;   // its first two coordinates, negated
+  };
+  struct State {
+    std::vector<Rigid3> poses;              // camera from the first image
+    std::vector<double> inverse_distances;  // of the corners, along their rays
+    Lens lens = Lens::Zero();
+    Eigen::Vector2d readout_s = Eigen::Vector2d::Zero();
+  };
+  struct Residual {
+    Eigen::Vector2d value = Eigen::Vector2d::Zero();  // normalized by the level
+    Eigen::Matrix<double, 2, 6> by_pose;              // where the corner is in image k
+    Eigen::Matrix<double, 2, 6> by_first_motion;      // the twist per second of the first image
+    Eigen::Vector2d by_inverse_distance;
+    ByShared by_shared;
+    double delay = 0;  // of the exposure in image k, seconds
+  };
+  // A twist per second as a weighted sum of the twists by which poses change.
+  struct Weight {
+    std::size_t image;
+    double per_second;
+  };
+  using Weights = std::array<Weight, 3>;
+
+  // The left twist per second of an image is the mean between its neighbours; of the first and the last image
+  // it is extrapolated.
+  Weights WeightsOf(std::size_t k) const {
+    const std::size_t n = state_.poses.size();
+    const auto rate = [&](std::size_t from) { return 1 / (times_s_[from + 1] - times_s_[from]); };
+    if (k == 0) return {{{0, -1.5 * rate(0)}, {1, 1.5 * rate(0) + 0.5 * rate(1)}, {2, -0.5 * rate(1)}}};
+    if (k + 1 == n) {
+      const double last = rate(n - 2), before = rate(n - 3);
+      return {{{n - 1, 1.5 * last}, {n - 2, -1.5 * last - 0.5 * before}, {n - 3, 0.5 * before}}};
+    }
+    const double mean = 1 / (times_s_[k + 1] - times_s_[k - 1]);
+    return {{{k + 1, mean}, {k - 1, -mean}, {k, 0}}};
+  }
+  void UpdateMotions() {
+    const auto mean = [&](std::size_t from, std::size_t to) -> Twist {
+      return (state_.poses[to] * state_.poses[from].inverse()).Log() / (times_s_[to] - times_s_[from]);
+    };
+    const std::size_t n = state_.poses.size();
+    for (std::size_t k = 1; k + 1 < n; ++k) motions_[k] = mean(k - 1, k + 1);
+    motions_.front() = 1.5 * mean(0, 1) - 0.5 * mean(1, 2);
+    motions_.back() = 1.5 * mean(n - 2, n - 1) - 0.5 * mean(n - 3, n - 2);
+  }
+
+  Eigen::Vector2d ImagePoint(const Eigen::Vector2d& pixel) const {
+    const CameraModel::Intrinsics& k = camera_.intrinsics();
+    return {(pixel.x() - k.cx) / k.fx, (pixel.y() - k.cy) / k.fy};
+  }
+  Eigen::Vector3d Velocity(std::size_t k, const Eigen::Vector3d& point, double inverse_distance) const {
+    return motions_[k].tail<3>().cross(point) + inverse_distance * motions_[k].head<3>();
+  }
+
+  // Points are scaled by the inverse distance of their corner.
+  bool Linearize(std::size_t i, std::size_t k, Residual* out) const {
+    const Corner& corner = corners_[i];
+    const double inverse = state_.inverse_distances[i];
+    const Eigen::Vector2d measured = corner.seen->pixels[k].cast<double>(),
+                          position = camera_.ReadoutPosition(measured),
+                          first_position =
+                              camera_.ReadoutPosition(corner.seen->pixels.front().cast<double>());
+    const Eigen::Matrix3d rotation = state_.poses[k].rotation.matrix();
+    // The corner at the time of the middle row of the first image, in its camera frame and in that of image
+    // k.
+    const double first_delay = state_.readout_s.dot(first_position);
+    out->delay = state_.readout_s.dot(position);
+    Eigen::Vector3d ray = corner.ray;
+    ray.head<2>() -= corner.ray_by_lens * state_.lens;
+    const Eigen::Vector3d first_velocity = Velocity(0, ray, inverse),
+                          middle = ray - first_delay * first_velocity,
+                          point = rotation * middle + inverse * state_.poses[k].translation,
+                          velocity = Velocity(k, point, inverse);
+    // At the exposure of the row, to second order in the rotation.
+    const Eigen::Vector3d rotated = motions_[k].tail<3>().cross(velocity),
+                          exposed = point + out->delay * velocity + 0.5 * out->delay * out->delay * rotated;
+    Eigen::Vector2d pixel;
+    Eigen::Matrix<double, 2, 3> by_point;
+    if (!camera_.Project(exposed, &pixel, &by_point)) return false;
+    const double scale = std::ldexp(1.0, -corner.seen->level);
+    ByLens by_lens = LensDerivatives(ImagePoint(pixel));
+    by_lens.row(0) *= camera_.intrinsics().fx;
+    by_lens.row(1) *= camera_.intrinsics().fy;
+    pixel += by_lens * state_.lens;
+    by_point *= scale;
+    out->value = scale * (pixel - measured);
+    out->by_pose << inverse * by_point, -by_point * Hat(point);
+    const Eigen::Matrix<double, 2, 3> by_middle = by_point * rotation;
+    out->by_first_motion << -first_delay * inverse * by_middle, first_delay * by_middle * Hat(ray);
+    out->by_inverse_distance = by_point * (state_.poses[k].translation + out->delay * motions_[k].head<3>()) -
+                               by_middle * (first_delay * motions_[0].head<3>());
+    out->by_shared.leftCols<kLens>() = scale * by_lens - by_middle.leftCols<2>() * corner.ray_by_lens;
+    out->by_shared.rightCols<2>() =
+        by_point * velocity * position.transpose() - by_middle * first_velocity * first_position.transpose();
+    return out->value.allFinite();
+  }
+
+  // Derivatives of a residual by the poses of images, without the first.
+  struct PoseBlock {
+    std::size_t image;
+    Eigen::Matrix<double, 2, 6> jacobian;
+  };
+  void CollectBlocks(std::size_t k, const Residual& residual) {
+    blocks_.clear();
+    const auto add = [&](std::size_t image, const Eigen::Matrix<double, 2, 6>& jacobian) {
+      if (image == 0) return;
+      for (PoseBlock& block : blocks_) {
+        if (block.image != image) continue;
+        block.jacobian += jacobian;
+        return;
+      }
+      blocks_.push_back({image, jacobian});
+    };
+    add(k, residual.by_pose);
+    for (const Weight& weight : weights_[k]) {
+      if (weight.per_second != 0) add(weight.image, residual.delay * weight.per_second * residual.by_pose);
+    }
+    for (const Weight& weight : weights_[0]) add(weight.image, weight.per_second * residual.by_first_motion);
+  }
+
+  // Of all residuals in the present state.
+  void Linearize() {
+    UpdateMotions();
+    const std::size_t n = state_.poses.size();
+    residuals_.resize(corners_.size() * (n - 1));
+    visible_.assign(residuals_.size(), 0);
+    norms_.clear();
+    for (std::size_t i = 0; i < corners_.size(); ++i) {
+      for (std::size_t k = 1; k < n; ++k) {
+        const std::size_t at = i * (n - 1) + k - 1;
+        visible_[at] = Linearize(i, k, &residuals_[at]) ? 1 : 0;
+        if (visible_[at]) norms_.push_back(residuals_[at].value.norm());
+      }
+    }
+    // The median of a squared norm with two degrees of freedom is 2 ln 2 variances.
+    sigma_px_ = Median(norms_) / std::sqrt(2 * std::log(2.0));
+  }
+  double RobustSigma() const { return std::max(options_.min_noise_px, sigma_px_); }
+  // With Huber's loss.
+  double Cost(double sigma) const {
+    double cost = 0;
+    for (const double norm : norms_) {
+      const double x = norm / sigma;
+      cost += x < kHuberFactor ? x * x : kHuberFactor * (2 * x - kHuberFactor);
+    }
+    cost += static_cast<double>(residuals_.size() - norms_.size()) * kHuberFactor * kHuberFactor;
+    for (const double inverse : state_.inverse_distances)
+      cost += (inverse - 1) * (inverse - 1) / (kInverseDistanceSigma * kInverseDistanceSigma);
+    return cost + prior_.head<kLens>().dot(state_.lens.cwiseAbs2()) +
+           prior_.tail<2>().dot(state_.readout_s.cwiseAbs2());
+  }
+
+  // The normal equations with the inverse distances eliminated: all poses but the first, then both axes of
+  // the readout time.
+  void Reduce(double sigma) {
+    const std::size_t n = state_.poses.size();
+    const double threshold = kHuberFactor * sigma;
+    const auto size = static_cast<Eigen::Index>(6 * (n - 1)) + kShared;
+    matrix_.setZero(size, size);
+    gradient_.setZero(size);
+    couplings_.setZero(size, static_cast<Eigen::Index>(corners_.size()));
+    hessians_.assign(corners_.size(), 1 / (kInverseDistanceSigma * kInverseDistanceSigma));
+    gradients_.assign(corners_.size(), 0.0);
+    for (std::size_t i = 0; i < corners_.size(); ++i) {
+      const auto column = static_cast<Eigen::Index>(i);
+      gradients_[i] = hessians_[i] * (state_.inverse_distances[i] - 1);
+      for (std::size_t k = 1; k < n; ++k) {
+        const std::size_t at = i * (n - 1) + k - 1;
+        if (!visible_[at]) continue;
+        const Residual& r = residuals_[at];
+        const double weight = std::min(1.0, threshold / std::max(r.value.norm(), 1e-12)) / (sigma * sigma);
+        CollectBlocks(k, r);
+        for (const PoseBlock& block : blocks_) {
+          const auto row = static_cast<Eigen::Index>(6 * (block.image - 1));
+          const Eigen::Matrix<double, 6, 2> weighted = weight * block.jacobian.transpose();
+          for (const PoseBlock& other : blocks_) {
+            if (other.image > block.image) continue;
+            const auto other_column = static_cast<Eigen::Index>(6 * (other.image - 1));
+            matrix_.block<6, 6>(row, other_column).noalias() += weighted * other.jacobian;
+          }
+          matrix_.block<kShared, 6>(size - kShared, row).noalias() += (weighted * r.by_shared).transpose();
+          gradient_.segment<6>(row).noalias() += weighted * r.value;
+          couplings_.col(column).segment<6>(row).noalias() += weighted * r.by_inverse_distance;
+        }
+        matrix_.bottomRightCorner<kShared, kShared>().noalias() +=
+            weight * r.by_shared.transpose() * r.by_shared;
+        gradient_.tail<kShared>().noalias() += weight * r.by_shared.transpose() * r.value;
+        couplings_.col(column).tail<kShared>().noalias() +=
+            weight * r.by_shared.transpose() * r.by_inverse_distance;
+        hessians_[i] += weight * r.by_inverse_distance.squaredNorm();
+        gradients_[i] += weight * r.by_inverse_distance.dot(r.value);
+      }
+      gradient_ -= gradients_[i] / hessians_[i] * couplings_.col(column);
+    }
+    Eigen::MatrixXd scaled = couplings_;
+    for (std::size_t i = 0; i < corners_.size(); ++i)
+      scaled.col(static_cast<Eigen::Index>(i)) /= std::sqrt(hessians_[i]);
+    matrix_.selfadjointView<Eigen::Lower>().rankUpdate(scaled, -1);
+    Eigen::Matrix<double, kShared, 1> present;
+    present << state_.lens, state_.readout_s;
+    matrix_.diagonal().tail<kShared>() += prior_;
+    gradient_.tail<kShared>() += prior_.cwiseProduct(present);
+  }
+
+  // Solves the reduced equations.
+  void Step(std::optional<Eigen::Index> axis, double damping) {
+    const Eigen::Index poses = matrix_.rows() - 2;
+    Eigen::MatrixXd matrix = matrix_;
+    Eigen::VectorXd gradient = gradient_;
+    matrix.diagonal() *= 1 + damping;
+    for (Eigen::Index a = 0; a < 2; ++a) {
+      if (axis == a) continue;
+      matrix.row(poses + a).setZero();
+      matrix.col(poses + a).setZero();
+      matrix(poses + a, poses + a) = 1;
+      gradient[poses + a] = 0;
+    }
+    const Eigen::VectorXd step = -matrix.ldlt().solve(gradient);
+    if (!step.allFinite()) return;
+    for (std::size_t k = 1; k < state_.poses.size(); ++k) {
+      const auto at = static_cast<Eigen::Index>(6 * (k - 1));
+      Rigid3& pose = state_.poses[k];
+      const Rotation3 rotation = Rotation3::Exp(step.segment<3>(at + 3));
+      pose = {rotation * pose.rotation, rotation * pose.translation + step.segment<3>(at)};
+    }
+    for (std::size_t i = 0; i < corners_.size(); ++i) {
+      const double change =
+          -(gradients_[i] + couplings_.col(static_cast<Eigen::Index>(i)).dot(step)) / hessians_[i];
+      double& inverse = state_.inverse_distances[i];
+      inverse = std::clamp(inverse + change, kMinInverseDistance, kMaxInverseDistance);
+    }
+    const double median = Median(state_.inverse_distances);
+    for (double& inverse : state_.inverse_distances) inverse /= median;
+    for (Rigid3& pose : state_.poses) pose.translation *= median;
+    constexpr double kMaxStep_s = 0.02;
+    state_.lens += step.segment<kLens>(poses - kLens);
+    if (axis) state_.readout_s[*axis] += std::clamp(step[poses + *axis], -kMaxStep_s, kMaxStep_s);
+  }
+
+  const TrackReadoutOptions& options_;
+  const CameraModel& camera_;
+  std::vector<double> times_s_;
+  State state_;
+  std::vector<Twist> motions_;  // left twist per second
+  std::vector<Corner> corners_;
+  double sigma_px_ = 0;
+  std::vector<double> norms_;                // of the residuals that are visible
+  std::vector<Weights> weights_;             // by image
+  Eigen::Matrix<double, kShared, 1> prior_;  // inverse variances
+  std::vector<PoseBlock> blocks_;            // scratch memory
+  // Of the last Reduce.
+  std::vector<Residual> residuals_;  // by corner, and by image without the first
+  std::vector<char> visible_;
+  Eigen::MatrixXd matrix_;  // lower triangle
+  Eigen::VectorXd gradient_;
+  Eigen::MatrixXd couplings_;  // of each inverse distance, a column
+  std::vector<double> hessians_, gradients_;
+};
+
+}  // namespace
+
+std::optional<std::string> TrackReadoutOptions::Validate() const {
+  return OptionCheck()
+      .AtLeast(min_corners, 8, "number of corners that tell the readout time")
+      .AtLeast(max_corners, min_corners, "largest number of corners that tell the readout time")
+      .AtLeast(min_images, 4, "number of images that tell the readout time")
+      .Positive(prior_sigma_s, "sigma of an unknown readout time")
+      .Positive(min_noise_px, "smallest noise of a corner")
+      .AtLeast(max_noise_px, min_noise_px, "largest noise of a corner")
+      .fault();
+}
+
+std::optional<TrackReadout> EstimateTrackReadout(const TrackReadoutOptions& options,
+                                                 const CameraModel& camera, const CornerSequence& sequence) {
+  if (static_cast<int>(sequence.images.size()) < options.min_images ||
+      static_cast<int>(sequence.corners.size()) < options.min_corners)
+    return std::nullopt;
+  TrackBundle bundle(options, camera, sequence);
+  if (static_cast<int>(bundle.corners()) < options.min_corners) return std::nullopt;
+  constexpr int kGlobalShutterSteps = 4, kSteps = 40;
+  bundle.Adjust(std::nullopt, kGlobalShutterSteps);
+  const TrackBundle::AxisEstimates axes = bundle.Axes();
+  const Eigen::Vector2d significance = axes.readout_s.cwiseAbs().cwiseQuotient(axes.sigma_s);
+  const Eigen::Index axis = significance.x() > significance.y() ? 0 : 1;
+  bundle.Adjust(axis, kSteps);
+  TrackReadout result;
+  result.readout_s = bundle.readout_s();
+  result.sigma_s = bundle.Axes().sigma_s[axis];
+  result.noise_px = bundle.sigma_px();
+  for (const CornerSequence::Image& image : sequence.images) result.times.push_back(image.time);
+  result.rotation_rates = bundle.RotationRates();
+  const double interval_s = ToSeconds(sequence.images.back().time - sequence.images.front().time) /
+                            static_cast<double>(sequence.images.size() - 1);
+  const double longest_s = result.readout_s.norm();
+  constexpr double kMaxIntervals = 1.3;
+  if (longest_s > kMaxIntervals * interval_s) return std::nullopt;
+  if (longest_s > interval_s) result.readout_s *= interval_s / longest_s;
+  const bool fits = result.noise_px <= options.max_noise_px && result.readout_s.allFinite() &&
+                    std::isfinite(result.sigma_s);
+  return fits ? std::optional(std::move(result)) : std::nullopt;
+}
+
+}  // namespace docent::engine
