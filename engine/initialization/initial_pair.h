@@ -4,10 +4,12 @@
 #include <Eigen/Core>
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <vector>
 
 #include "engine/base/time.h"
 #include "engine/geometry/camera_model.h"
+#include "engine/geometry/readout_prior.h"
 #include "engine/geometry/rigid3.h"
 #include "engine/initialization/two_view_geometry.h"
 #include "engine/map/map_snapshot.h"
@@ -30,7 +32,8 @@ struct InitialPair {
   std::vector<Match> matches;
   Rigid3 a_from_map;       // pose of the first view if the map already exists as a panorama; else identity
   TwoViewResult geometry;  // one inlier flag and one point per match
-  double baseline_m = 0;   // distance of the views in metres; 0 if unknown
+  std::optional<ReadoutPrior> readout;  // what is known of the readout time without a map
+  double baseline_m = 0;                // distance of the views in metres; 0 if unknown
 };
 
 }  // namespace docent::engine

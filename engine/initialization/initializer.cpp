@@ -14,6 +14,8 @@ namespace {
 // Shares of the progress: the image moves enough, and the parallax is significant; the third view is the
 // rest.
 constexpr double kMotionShare = 0.2, kParallaxShare = 0.6;
+// Displacement of the first and the last row by a rolling shutter, pixels.
+constexpr double kNegligiblePx = 0.5;
 
 using Rays = std::vector<Eigen::Vector3d>;
 
@@ -39,7 +41,10 @@ std::optional<std::string> InitializerOptions::Validate() const {
       .AtLeast(min_motion_px, 0, "motion between two views")
       .AtLeast(attempt_interval, 1, "interval between two estimates")
       .AtLeast(unknown_readout_s, 0, "unknown readout time")
+      .AtLeast(min_readout_sigmas, 0, "significance of a readout time")
+      .AtLeast(min_readout_s, 0, "smallest readout time")
       .Contained(tracks.Validate())
+      .Contained(track_readout.Validate())
       .Contained(two_view.Validate())
       .Contained(confirmation.Validate())
       .fault();
@@ -115,81 +120,123 @@ std::optional<InitialPair> Initializer::Attempt(const CornerTracks::FirstView& f
     attempt_progress_ = kMotionShare * motion_px / min_motion_px;
     return std::nullopt;
   }
-  std::vector<InitialPair::Match> matches;
-  std::vector<std::uint32_t> ids;
-  tracks_.Matches(first, &matches, &ids);
+  MatchedViews views;
+  tracks_.Matches(first, &views.matches, &views.ids);
   const std::array<Eigen::Vector3d, 2>& last_rates = tracks_.last_rates();
-  return Solve({first.time, first.features, ImageCamera(first.rates[0], first.rates[1])},
-               {time, features, ImageCamera(last_rates[1], last_rates[0])}, std::move(matches), ids,
-               tracks_.MedianSpeedChangePx(first), &confirmations_[first.slot]);
+  views.a = {first.time, first.features, ImageCamera(first.rates[0], first.rates[1])};
+  views.b = {time, features, ImageCamera(last_rates[1], last_rates[0])};
+  views.options = OptionsFor(tracks_.MedianSpeedChangePx(first));
+  return Solve(
+      std::move(views), [this] { return ReadoutFromCorners(); }, &confirmations_[first.slot]);
 }
 
 std::optional<InitialPair> Initializer::TryViews(const InitialPair::View& a, const InitialPair::View& b,
                                                  std::vector<InitialPair::Match> matches,
-                                                 std::span<const std::uint32_t> ids, double speed_change_px) {
-  auto pair = Solve(a, b, std::move(matches), ids, speed_change_px, &views_confirmation_);
+                                                 std::span<const std::uint32_t> ids, double speed_change_px,
+                                                 const ReadoutSource& readout) {
+  MatchedViews views = {a, b, std::move(matches), {ids.begin(), ids.end()}, OptionsFor(speed_change_px), {}};
+  auto pair = Solve(std::move(views), readout, &views_confirmation_);
   UpdateProgress(attempt_progress_);
   return pair;
 }
 
-bool Initializer::HasDepthWithAnyReadout(const InitialPair::View& a, const InitialPair::View& b,
-                                         std::span<const InitialPair::Match> matches,
-                                         const TwoViewOptions& options) const {
+TwoViewOptions Initializer::OptionsFor(double speed_change_px) {
+  TwoViewOptions options = options_.two_view;
+  options.pixel_angle = camera_->PixelAngle();
+  options.depth_noise.speed_change_px = speed_change_px;
+  options.seed = random_.Next();
+  return options;
+}
+
+TwoViewResult Initializer::EstimateGeometry(MatchedViews* views) {
+  Rays rays_a, rays_b;
+  std::size_t kept = 0;
+  for (std::size_t i = 0; i < views->matches.size(); ++i) {
+    if (!Unproject(views->matches[i], *views->a.camera, *views->b.camera, &rays_a, &rays_b)) continue;
+    views->matches[kept] = views->matches[i];
+    views->ids[kept++] = views->ids[i];
+  }
+  views->matches.resize(kept);
+  views->ids.resize(kept);
+  return EstimateTwoViews(rays_a, rays_b, views->options);
+}
+
+double Initializer::DisplacementPx(const InitialPair::View& a, const InitialPair::View& b,
+                                   double seconds) const {
+  const double rate = std::max(a.camera->readout_motion().rotation_rate.norm(),
+                               b.camera->readout_motion().rotation_rate.norm());
+  return 0.5 * rate * seconds / camera_->PixelAngle();
+}
+
+std::optional<TrackReadout> Initializer::ReadoutFromCorners() const {
+  if (!options_.estimate_readout || camera_->known_readout_s() || !tracks_.started()) return std::nullopt;
+  return EstimateTrackReadout(options_.track_readout, *camera_, tracks_.Sequence(tracks_.views().front()));
+}
+
+bool Initializer::UseReadout(const TrackReadout& readout, MatchedViews* views) {
+  views->readout = {readout.readout_s, readout.sigma_s};
+  const double smallest = std::max(options_.min_readout_s, options_.min_readout_sigmas * readout.sigma_s);
+  if (readout.readout_s.norm() < smallest) return false;
+  readout_s_ = readout.readout_s;
+  for (InitialPair::View* view : {&views->a, &views->b}) {
+    const auto image = std::ranges::find(readout.times, view->time);
+    const Eigen::Vector3d rate =
+        image != readout.times.end()
+            ? readout.rotation_rates[static_cast<std::size_t>(image - readout.times.begin())]
+            : view->camera->readout_motion().rotation_rate;
+    view->camera = std::make_shared<CameraModel>(CameraModel::WithReadout(camera_, {rate, readout_s_}));
+  }
+  return true;
+}
+
+bool Initializer::HasDepthWithAnyReadout(const MatchedViews& views) const {
   // Estimates of 20 ms were 8 to 28 ms, and what an imperfect calibration of the lens leaves of a turn looks
   // like a readout time too: of 20 starts in a simulated museum with a known readout time, one was false.
   constexpr double kRatioOnceKnown = 0.5;
   const bool known = !readout_s_.isZero(0) || camera_->known_readout_s();
   const double deviation_s = (known ? kRatioOnceKnown : 1) * options_.unknown_readout_s;
-  if (deviation_s == 0) return true;
-  const ReadoutMotion &motion_a = a.camera->readout_motion(), &motion_b = b.camera->readout_motion();
-  const double rate = std::max(motion_a.rotation_rate.norm(), motion_b.rotation_rate.norm());
-  // In pixels, of the first and the last row.
-  constexpr double kNegligiblePx = 0.5;
-  if (0.5 * rate * deviation_s < kNegligiblePx * options.pixel_angle) return true;
+  if (deviation_s == 0 || DisplacementPx(views.a, views.b, deviation_s) < kNegligiblePx) return true;
   for (const Eigen::Vector2d& direction : {Eigen::Vector2d(0, 1), {0, -1}, {1, 0}, {-1, 0}}) {
-    const Eigen::Vector2d readout_s = readout_s_ + deviation_s * direction;
-    const CameraModel camera_a = CameraModel::WithReadout(camera_, {motion_a.rotation_rate, readout_s}),
-                      camera_b = CameraModel::WithReadout(camera_, {motion_b.rotation_rate, readout_s});
+    const auto camera = [&](const InitialPair::View& view) {
+      const Eigen::Vector3d& rate = view.camera->readout_motion().rotation_rate;
+      return CameraModel::WithReadout(camera_, {rate, readout_s_ + deviation_s * direction});
+    };
+    const CameraModel camera_a = camera(views.a), camera_b = camera(views.b);
     Rays rays_a, rays_b;
-    for (const InitialPair::Match& match : matches) Unproject(match, camera_a, camera_b, &rays_a, &rays_b);
-    if (!HasDepth(EstimateTwoViews(rays_a, rays_b, options))) return false;
+    for (const InitialPair::Match& match : views.matches)
+      Unproject(match, camera_a, camera_b, &rays_a, &rays_b);
+    if (!HasDepth(EstimateTwoViews(rays_a, rays_b, views.options))) return false;
   }
   return true;
 }
 
-std::optional<InitialPair> Initializer::Solve(const InitialPair::View& a, const InitialPair::View& b,
-                                              std::vector<InitialPair::Match> matches,
-                                              std::span<const std::uint32_t> ids, double speed_change_px,
+std::optional<InitialPair> Initializer::Solve(MatchedViews views, const ReadoutSource& readout_source,
                                               StartConfirmation* confirmation) {
-  std::vector<std::uint32_t> kept;
-  InitialPair pair;
-  Rays rays_a, rays_b;
-  for (std::size_t i = 0; i < matches.size(); ++i) {
-    if (!Unproject(matches[i], *a.camera, *b.camera, &rays_a, &rays_b)) continue;
-    kept.push_back(ids[i]);
-    pair.matches.push_back(matches[i]);
+  TwoViewResult geometry = EstimateGeometry(&views);
+  if (HasDepth(geometry)) {
+    const auto readout = readout_source();
+    if (readout && UseReadout(*readout, &views)) geometry = EstimateGeometry(&views);
   }
-  TwoViewOptions options = options_.two_view;
-  options.pixel_angle = camera_->PixelAngle();
-  options.depth_noise.speed_change_px = speed_change_px;
-  options.seed = random_.Next();
-  pair.geometry = EstimateTwoViews(rays_a, rays_b, options);
-  const bool any_readout = options_.confirmation.with_any_readout || !confirmation->Awaits(a.time);
-  if (HasDepth(pair.geometry) && any_readout && !HasDepthWithAnyReadout(a, b, pair.matches, options))
-    pair.geometry.outcome = TwoViewOutcome::kTooLittleParallax;
-  hint_ = HintFor(pair.geometry.outcome);
-  attempt_progress_ = kMotionShare + kParallaxShare * ParallaxProgress(pair.geometry, options) +
-                      (1 - kMotionShare - kParallaxShare) * confirmation->GrowthProgress(pair.geometry);
+  const bool any_readout = options_.confirmation.with_any_readout || !confirmation->Awaits(views.a.time);
+  if (HasDepth(geometry) && any_readout && !HasDepthWithAnyReadout(views))
+    geometry.outcome = TwoViewOutcome::kTooLittleParallax;
+  hint_ = HintFor(geometry.outcome);
+  attempt_progress_ = kMotionShare + kParallaxShare * ParallaxProgress(geometry, views.options) +
+                      (1 - kMotionShare - kParallaxShare) * confirmation->GrowthProgress(geometry);
   awaits_confirmation_ = false;
-  if (!HasDepth(pair.geometry)) return std::nullopt;
-  if (!confirmation->Confirm(a.time, kept, pair.geometry)) {
+  if (!HasDepth(geometry)) return std::nullopt;
+  if (!confirmation->Confirm(views.a.time, views.ids, geometry)) {
     awaits_confirmation_ = true;
     hint_ = HintFor(TwoViewOutcome::kTooLittleParallax);
     return std::nullopt;
   }
+  InitialPair pair;
   pair.camera = camera_;
-  pair.a = a;
-  pair.b = b;
+  pair.a = std::move(views.a);
+  pair.b = std::move(views.b);
+  pair.matches = std::move(views.matches);
+  pair.geometry = std::move(geometry);
+  pair.readout = views.readout;
   return pair;
 }
 

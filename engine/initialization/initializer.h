@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <functional>
 #include <memory>
 #include <optional>
 #include <span>
@@ -24,6 +25,14 @@ struct InitializerOptions {
   // displaces the first and the last row against each other by ten pixels, which looks like depth. 60 % of
   // the time between two images at 30 Hz; half as long around a known one. 0: a global shutter is assumed.
   double unknown_readout_s = 0.02;
+  // Whether the readout time is estimated from the corners before the first map; not while the calibration of
+  // the camera is unknown, since its errors look alike.
+  bool estimate_readout = true;
+  // The readout time that the corners tell is used once it differs from zero by this many standard deviations
+  // and seconds. Errors of a calibration looked like up to 3.5 ms in real recordings; this is twice that.
+  double min_readout_sigmas = 3;
+  double min_readout_s = 0.007;
+  TrackReadoutOptions track_readout;
   TwoViewOptions two_view;
   StartConfirmationOptions confirmation;
 
@@ -37,6 +46,9 @@ struct InitializerOptions {
 // the tracker's thread.
 class Initializer {
  public:
+  // Estimates the readout time. Called only where two views have depth, since that takes long.
+  using ReadoutSource = std::function<std::optional<TrackReadout>()>;
+
   Initializer(const InitializerOptions& options, std::shared_ptr<const CameraModel> camera,
               std::uint64_t seed);
 
@@ -51,10 +63,14 @@ class Initializer {
 
   // The same for two views whose keypoints the caller has matched, such as the points of a panorama map in
   // one of its keyframes and in the current frame. ids: one per match, ascending. speed_change_px: difference
-  // of the image speed between the two views, in pixels per frame.
+  // of the image speed between the two views, in pixels per frame. readout: ReadoutFromCorners of the camera.
   std::optional<InitialPair> TryViews(const InitialPair::View& a, const InitialPair::View& b,
                                       std::vector<InitialPair::Match> matches,
-                                      std::span<const std::uint32_t> ids, double speed_change_px);
+                                      std::span<const std::uint32_t> ids, double speed_change_px,
+                                      const ReadoutSource& readout);
+  // What the corners tell that are tracked since the oldest first view. Empty if they do not tell it, or if
+  // the calibration of the camera states it.
+  std::optional<TrackReadout> ReadoutFromCorners() const;
 
   // Whether the views that were tried last have depth, which a third view has yet to confirm.
   bool awaits_confirmation() const { return awaits_confirmation_; }
@@ -70,14 +86,25 @@ class Initializer {
  private:
   std::optional<InitialPair> Attempt(const CornerTracks::FirstView& first, Timestamp time,
                                      const std::shared_ptr<const ImageFeatures>& features);
-  std::optional<InitialPair> Solve(const InitialPair::View& a, const InitialPair::View& b,
-                                   std::vector<InitialPair::Match> matches,
-                                   std::span<const std::uint32_t> ids, double speed_change_px,
+  // Two views whose keypoints are matched. ids: one per match.
+  struct MatchedViews {
+    InitialPair::View a, b;
+    std::vector<InitialPair::Match> matches;
+    std::vector<std::uint32_t> ids;
+    TwoViewOptions options;
+    std::optional<ReadoutPrior> readout;
+  };
+  TwoViewOptions OptionsFor(double speed_change_px);
+  // Removes matches without rays.
+  static TwoViewResult EstimateGeometry(MatchedViews* views);
+  std::optional<InitialPair> Solve(MatchedViews views, const ReadoutSource& readout,
                                    StartConfirmation* confirmation);
+  // Gives the views the cameras that an estimate of the readout time implies. True if they have changed.
+  bool UseReadout(const TrackReadout& readout, MatchedViews* views);
+  // Largest displacement of a row by the rotation of an image in so many seconds, pixels.
+  double DisplacementPx(const InitialPair::View& a, const InitialPair::View& b, double seconds) const;
   // Whether two views with depth have depth whatever the readout time is, as long as it is unknown.
-  bool HasDepthWithAnyReadout(const InitialPair::View& a, const InitialPair::View& b,
-                              std::span<const InitialPair::Match> matches,
-                              const TwoViewOptions& options) const;
+  bool HasDepthWithAnyReadout(const MatchedViews& views) const;
   // The model of an image near the time of the newest two rotations.
   std::shared_ptr<const CameraModel> ImageCamera(const Eigen::Vector3d& newest,
                                                  const Eigen::Vector3d& other) const;

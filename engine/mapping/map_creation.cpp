@@ -30,6 +30,7 @@ void MapCreation::CreateFromPair(const InitialPair& pair) {
     return;
   }
   refinement_->SetNewest(views.b);
+  refinement_->SetReadoutPrior(pair.readout, pair.camera);
   if (refinement_->UpdateReadout()) AdjustGlobally(options_.adjustment, nullptr, &map);
   RemoveDuplicateInfinitePoints(views.a, &map);
   if (extends) panoramas_->PlanConversion(views.a, views.b);

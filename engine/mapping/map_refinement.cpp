@@ -10,6 +10,7 @@ namespace docent::engine {
 void MapRefinement::Reset() {
   Forget();
   newest_ = kNoId;
+  readout_prior_.reset();
   global_due_ = culling_due_ = loop_to_adjust_ = false;
   locally_adjusted_ = true;
 }
@@ -59,7 +60,11 @@ void MapRefinement::AdjustAroundNewest() {
 bool MapRefinement::UpdateReadout() {
   // The errors of a calibration that is not known yet look like those of a readout time.
   if (options_.temporary || !options_.lens.lenses.empty()) return false;
-  return CalibrateReadout(options_.readout, options_.adjustment, newest_, &workspace_->map);
+  ReadoutEstimationOptions options = options_.readout;
+  const Map::KeyFrameRecord* newest = workspace_->map.FindKeyFrame(newest_);
+  if (readout_prior_ && newest && newest->keyframe.camera->HasSameLens(*lens_of_prior_))
+    options.prior = readout_prior_;
+  return CalibrateReadout(options, options_.adjustment, newest_, &workspace_->map);
 }
 
 void MapRefinement::AdjustWholeMap() {

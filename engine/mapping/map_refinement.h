@@ -3,7 +3,10 @@
 
 #include <atomic>
 #include <cstddef>
+#include <memory>
+#include <optional>
 #include <span>
+#include <utility>
 #include <vector>
 
 #include "engine/mapping/map_workspace.h"
@@ -47,6 +50,11 @@ class MapRefinement {
   // Searches the new points in the keyframes that share most points with the newest one.
   void MatchNewPoints();
   void AdjustAroundNewest();
+  // What is known of the readout time of a lens without the map; of other lenses nothing is known.
+  void SetReadoutPrior(const std::optional<ReadoutPrior>& prior, std::shared_ptr<const CameraModel> lens) {
+    readout_prior_ = prior;
+    lens_of_prior_ = std::move(lens);
+  }
   // Estimates the readout time of the newest keyframe's camera. True if it changed, so that the map has to be
   // adjusted.
   bool UpdateReadout();
@@ -60,6 +68,8 @@ class MapRefinement {
   MapWorkspace* const workspace_;
   MapperOutput* const output_;
   KeyFrameId newest_ = kNoId;
+  std::optional<ReadoutPrior> readout_prior_;
+  std::shared_ptr<const CameraModel> lens_of_prior_;
   std::vector<MapPointId> to_match_;
   std::atomic<bool> locally_adjusted_{true};
   bool loop_to_adjust_ = false;  // the next global adjustment follows a loop

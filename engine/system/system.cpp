@@ -30,6 +30,7 @@ System::System(const SystemOptions& options, std::vector<std::shared_ptr<const C
   state_.lenses = options.mapper.lens.lenses;
   TrackerOptions tracker_options = options.tracker;
   tracker_options.build_maps = options.extend_maps;
+  tracker_options.initializer.estimate_readout &= options.mapper.lens.lenses.empty();
   for (std::size_t i = 0; i < cameras.size(); ++i) {
     SystemCamera camera;
     camera.tracker = std::make_unique<Tracker>(tracker_options, cameras[i], options.seed + i);

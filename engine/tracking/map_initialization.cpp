@@ -210,7 +210,8 @@ std::optional<InitialPair> MapInitialization::TryPanoramaViews(const CameraImage
       rate != keyframe_rotation_rates_.end() ? rate->second : Eigen::Vector3d(Eigen::Vector3d::Zero());
   auto pair = initializer_.TryViews({keyframe->time, keyframe->features, keyframe->camera},
                                     {image.time, image.features, image.camera}, std::move(matches), ids,
-                                    (rotation_rate - before).norm() / image.camera->PixelAngle());
+                                    (rotation_rate - before).norm() / image.camera->PixelAngle(),
+                                    [this] { return initializer_.ReadoutFromCorners(); });
   if (pair) pair->a_from_map = keyframe->camera_from_map;
   return pair;
 }
@@ -225,7 +226,8 @@ std::optional<InitialPair> MapInitialization::TryWideBaseline(const CameraImage&
     const double speed_change_px =
         (rotation_rate - views.earlier.rotation_rate).norm() / image.camera->PixelAngle();
     auto pair = wide_initializer_.TryViews(views.earlier.image, {image.time, image.features, image.camera},
-                                           std::move(views.matches), views.ids, speed_change_px);
+                                           std::move(views.matches), views.ids, speed_change_px,
+                                           [this] { return initializer_.ReadoutFromCorners(); });
     if (pair) {
       pair->a_from_map = views.earlier.camera_from_map;
       return pair;

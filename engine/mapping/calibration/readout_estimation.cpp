@@ -182,16 +182,22 @@ std::optional<ReadoutEstimate> EstimateReadout(const ReadoutEstimationOptions& o
   Eigen::Matrix2d information;
   Eigen::Vector2d gradient;
   if (!reduced.Reduce(sigma, &information, &gradient)) return std::nullopt;
-  const double prior = 1 / (options.prior_sigma_s * options.prior_sigma_s);
-  const Eigen::Vector2d weighted = (information * before - gradient) / (sigma * sigma);
-  information /= sigma * sigma;
+  const auto& known = options.prior;
+  const double prior_sigma_s = known ? known->sigma_s : options.prior_sigma_s,
+               prior = 1 / (prior_sigma_s * prior_sigma_s);
+  // The rotation rates of the keyframes are not adjusted, so that their errors are those of the readout time.
+  constexpr double kRateErrors = 3;
+  const double variance = (known ? kRateErrors * kRateErrors : 1) * sigma * sigma;
+  Eigen::Vector2d weighted = (information * before - gradient) / variance;
+  if (known) weighted += prior * known->readout_s;
+  information /= variance;
   ReadoutEstimate estimate;
   // Rows are exposed one after another, or columns: each axis is estimated as if the other one were zero.
   for (int axis = 0; axis < 2; ++axis) {
-    const double known = information(axis, axis) + prior;
+    const double total = information(axis, axis) + prior;
     estimate.readout_s[axis] =
-        std::clamp(weighted[axis] / known, -options.max_readout_s, options.max_readout_s);
-    estimate.sigma_s[axis] = 1 / std::sqrt(known);
+        std::clamp(weighted[axis] / total, -options.max_readout_s, options.max_readout_s);
+    estimate.sigma_s[axis] = 1 / std::sqrt(total);
   }
   return estimate;
 }

@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "engine/geometry/readout_prior.h"
 #include "engine/mapping/bundle/bundle_adjustment.h"
 
 namespace docent::engine {
@@ -15,6 +16,8 @@ struct ReadoutEstimationOptions {
   // Standard deviation of the readout time before anything is known, seconds. Phones take 28 to 61 ms
   // (Ringaby and Forssen 2012), webcams about as long, a global shutter none.
   double prior_sigma_s = 0.03;
+  // From other measurements, such as those of the initialization; instead of zero with prior_sigma_s.
+  std::optional<ReadoutPrior> prior = std::nullopt;
   // A readout time is used once it differs from zero by this many standard deviations and seconds. Errors of
   // a calibration looked like up to 3.5 ms in real recordings; this is twice that. A faster shutter counts as
   // global.

@@ -185,7 +185,8 @@ bool StartsMap(const Turn& turn, double unknown_readout_s, std::uint64_t seed,
     std::vector<std::uint32_t> ids(matches.size());
     std::iota(ids.begin(), ids.end(), 0U);
     pair = initializer.TryViews({FromSeconds(0), nullptr, view(slow)},
-                                {FromSeconds(growth), nullptr, view(fast)}, matches, ids, 0);
+                                {FromSeconds(growth), nullptr, view(fast)}, matches, ids, 0,
+                                [] { return std::optional<TrackReadout>(); });
     EXPECT_FALSE(pair && initializer.awaits_confirmation());
   }
   return pair.has_value();
