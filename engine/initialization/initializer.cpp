@@ -174,9 +174,9 @@ std::optional<TrackReadout> Initializer::ReadoutFromCorners() const {
 }
 
 bool Initializer::UseReadout(const TrackReadout& readout, MatchedViews* views) {
-  views->readout = {readout.readout_s, readout.sigma_s};
   const double smallest = std::max(options_.min_readout_s, options_.min_readout_sigmas * readout.sigma_s);
   if (readout.readout_s.norm() < smallest) return false;
+  views->readout = {readout.readout_s, readout.sigma_s};
   readout_s_ = readout.readout_s;
   for (InitialPair::View* view : {&views->a, &views->b}) {
     const auto image = std::ranges::find(readout.times, view->time);
