@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "engine/mapping/map_refinement.h"
 
+#include <algorithm>
 #include <utility>
 
 #include "engine/mapping/calibration/readout_calibration.h"
@@ -10,7 +11,7 @@ namespace docent::engine {
 void MapRefinement::Reset() {
   Forget();
   newest_ = kNoId;
-  readout_prior_.reset();
+  known_readouts_.clear();
   global_due_ = culling_due_ = loop_to_adjust_ = false;
   locally_adjusted_ = true;
 }
@@ -49,22 +50,40 @@ void MapRefinement::AdjustAroundNewest() {
   const BundleSummary summary = AdjustLocally(options_.adjustment, newest_, interrupt_, &workspace_->map);
   if (summary.outcome != BundleSummary::Outcome::kInterrupted) {
     locally_adjusted_ = true;
-    if (UpdateReadout()) {
-      AdjustLocally(options_.adjustment, newest_, interrupt_, &workspace_->map);
-      RequireGlobalAdjustment();
-    }
+    AdjustToReadout();
   }
   output_->Publish(workspace_->map.Snapshot());
 }
 
+std::vector<MapRefinement::KnownReadout>::iterator MapRefinement::FindKnownReadout(const CameraModel& lens) {
+  return std::ranges::find_if(known_readouts_,
+                              [&](const KnownReadout& known) { return known.lens->HasSameLens(lens); });
+}
+
+void MapRefinement::SetReadoutPrior(const std::optional<ReadoutPrior>& prior,
+                                    std::shared_ptr<const CameraModel> lens) {
+  const auto known = FindKnownReadout(*lens);
+  if (known != known_readouts_.end()) known_readouts_.erase(known);
+  if (prior) known_readouts_.push_back({std::move(lens), *prior});
+}
+
+bool MapRefinement::AdjustToReadout() {
+  if (!UpdateReadout()) return false;
+  AdjustLocally(options_.adjustment, newest_, interrupt_, &workspace_->map);
+  RequireGlobalAdjustment();
+  return true;
+}
+
 bool MapRefinement::UpdateReadout() {
-  // The errors of a calibration that is not known yet look like those of a readout time.
-  if (options_.temporary || !options_.lens.lenses.empty()) return false;
-  ReadoutEstimationOptions options = options_.readout;
   const Map::KeyFrameRecord* newest = workspace_->map.FindKeyFrame(newest_);
-  if (readout_prior_ && newest && newest->keyframe.camera->HasSameLens(*lens_of_prior_))
-    options.prior = readout_prior_;
-  return CalibrateReadout(options, options_.adjustment, newest_, &workspace_->map);
+  if (!MayEstimateReadout() || !newest) return false;
+  const std::shared_ptr<const CameraModel> camera = newest->keyframe.camera;
+  ReadoutEstimationOptions options = options_.readout;
+  const auto known = FindKnownReadout(*camera);
+  if (known != known_readouts_.end()) options.prior = known->prior;
+  const ReadoutCalibration result = CalibrateReadout(options, options_.adjustment, newest_, &workspace_->map);
+  if (result.estimate) SetReadoutPrior(result.estimate, camera);
+  return result.changed;
 }
 
 void MapRefinement::AdjustWholeMap() {

@@ -11,30 +11,31 @@
 
 namespace docent::engine {
 
-bool CalibrateReadout(const ReadoutEstimationOptions& options, const MapAdjustmentOptions& window,
-                      KeyFrameId newest, Map* map) {
+ReadoutCalibration CalibrateReadout(const ReadoutEstimationOptions& options,
+                                    const MapAdjustmentOptions& window, KeyFrameId newest, Map* map) {
   const Map::KeyFrameRecord* record = options.enabled ? map->FindKeyFrame(newest) : nullptr;
-  if (!record) return false;
+  if (!record) return {};
   const std::shared_ptr<const CameraModel> image = record->keyframe.camera;
-  if (image->known_readout_s()) return false;
+  if (image->known_readout_s()) return {};
   const auto before = ReadoutIn(*map, *image);
-  if (!before) return false;
+  if (!before) return {};
   const MapAssembly assembly = AssembleAround(window.window, window.max_fixed, newest, map);
   std::vector<char> of_lens;
   for (const BundleProblem::Camera& camera : assembly.problem.cameras)
     of_lens.push_back(camera.model->HasSameLens(*image));
   const auto estimate = EstimateReadout(options, of_lens, assembly.problem);
-  if (!estimate) return false;
+  if (!estimate) return {};
   // Rows are exposed one after another, or columns.
   const Eigen::Vector2d sigmas = estimate->readout_s.cwiseAbs().cwiseQuotient(estimate->sigma_s);
   const int axis = sigmas.x() > sigmas.y() ? 0 : 1;
   const double value = estimate->readout_s[axis], sigma = estimate->sigma_s[axis];
   const double smallest = std::max(options.min_readout_s, options.min_sigmas * sigma);
-  if ((*before)[axis] == 0 && std::abs(value) < smallest) return false;
-  Eigen::Vector2d readout_s = Eigen::Vector2d::Zero();
-  readout_s[axis] = value;
-  if ((readout_s - *before).norm() < std::max(options.min_change_s, sigma)) return false;
-  return SetReadout(*image, readout_s, map);
+  if ((*before)[axis] == 0 && std::abs(value) < smallest) return {};
+  ReadoutPrior known;
+  known.readout_s[axis] = value;
+  known.sigma_s = (options.prior ? 1 : kReadoutRateErrors) * sigma;
+  const bool differs = (known.readout_s - *before).norm() >= std::max(options.min_change_s, sigma);
+  return {differs && SetReadout(*image, known.readout_s, map), known};
 }
 
 }  // namespace docent::engine

@@ -185,9 +185,7 @@ std::optional<ReadoutEstimate> EstimateReadout(const ReadoutEstimationOptions& o
   const auto& known = options.prior;
   const double prior_sigma_s = known ? known->sigma_s : options.prior_sigma_s,
                prior = 1 / (prior_sigma_s * prior_sigma_s);
-  // The rotation rates of the keyframes are not adjusted, so that their errors are those of the readout time.
-  constexpr double kRateErrors = 3;
-  const double variance = (known ? kRateErrors * kRateErrors : 1) * sigma * sigma;
+  const double variance = (known ? kReadoutRateErrors * kReadoutRateErrors : 1) * sigma * sigma;
   Eigen::Vector2d weighted = (information * before - gradient) / variance;
   if (known) weighted += prior * known->readout_s;
   information /= variance;

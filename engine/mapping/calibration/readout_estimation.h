@@ -11,12 +11,17 @@
 
 namespace docent::engine {
 
+// The rotation rates of keyframes are not adjusted, so that their errors are those of the readout time: its
+// error is so many times as large as if all errors were independent.
+inline constexpr double kReadoutRateErrors = 3;
+
 struct ReadoutEstimationOptions {
   bool enabled = true;
   // Standard deviation of the readout time before anything is known, seconds. Phones take 28 to 61 ms
   // (Ringaby and Forssen 2012), webcams about as long, a global shutter none.
   double prior_sigma_s = 0.03;
-  // From other measurements, such as those of the initialization; instead of zero with prior_sigma_s.
+  // From other measurements, such as those of the initialization or of earlier windows; instead of zero with
+  // prior_sigma_s. Then the measurements count kReadoutRateErrors squared times less.
   std::optional<ReadoutPrior> prior = std::nullopt;
   // A readout time is used once it differs from zero by this many standard deviations and seconds. Errors of
   // a calibration looked like up to 3.5 ms in real recordings; this is twice that. A faster shutter counts as

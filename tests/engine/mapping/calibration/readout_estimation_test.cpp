@@ -153,6 +153,21 @@ TEST(ReadoutEstimation, NeverExceedsTheLargestReadoutTime) {
   EXPECT_LE(estimate->readout_s.cwiseAbs().maxCoeff(), 0.03);
 }
 
+TEST(ReadoutEstimation, WeighsTheMapAgainstWhatIsKnownAlready) {
+  const BundleProblem problem = Scene(6, {0, 0.02}, {0, 0.02}, 5);
+  const auto with_prior = [&](double sigma_s) {
+    return EstimateReadout({.prior = ReadoutPrior{{0, 0.01}, sigma_s}}, All(problem), problem);
+  };
+  const auto certain = with_prior(1e-5), vague = with_prior(1);
+  ASSERT_TRUE(certain && vague);
+  EXPECT_NEAR(certain->readout_s.y(), 0.01, 0.0002);
+  EXPECT_NEAR(vague->readout_s.y(), 0.02, 0.001);
+  EXPECT_LT(certain->sigma_s.y(), 1.1e-5);
+  const auto without = EstimateReadout({}, All(problem), problem);
+  ASSERT_TRUE(without);
+  EXPECT_NEAR(vague->sigma_s.y(), kReadoutRateErrors * without->sigma_s.y(), 0.02 * vague->sigma_s.y());
+}
+
 TEST(ReadoutEstimation, RefusesOptionsThatMakeNoSense) {
   EXPECT_FALSE(ReadoutEstimationOptions().Validate());
   EXPECT_TRUE((ReadoutEstimationOptions{.prior_sigma_s = 0}).Validate());
@@ -194,7 +209,7 @@ TEST(ReadoutCalibration, GivesTheKeyFramesTheirReadoutTimeAndKeepsIt) {
   Map map = MapOf(Scene(6, {0, 0.02}, {0, 0}, 6));
   const KeyFrameId newest = map.keyframes().rbegin()->first;
   const MapAdjustmentOptions adjustment;
-  ASSERT_TRUE(CalibrateReadout({}, adjustment, newest, &map));
+  ASSERT_TRUE(CalibrateReadout({}, adjustment, newest, &map).changed);
   for (int round = 0; round < 5; ++round) {
     AdjustLocally(adjustment, newest, nullptr, &map);
     CalibrateReadout({}, adjustment, newest, &map);
@@ -202,7 +217,30 @@ TEST(ReadoutCalibration, GivesTheKeyFramesTheirReadoutTimeAndKeepsIt) {
   EXPECT_NEAR(ReadoutOfNewest(map).y(), 0.02, 0.001);
   EXPECT_EQ(ReadoutOfNewest(map).x(), 0) << "only rows are exposed one after another";
   AdjustLocally(adjustment, newest, nullptr, &map);
-  EXPECT_FALSE(CalibrateReadout({}, adjustment, newest, &map)) << "nothing has changed";
+  EXPECT_FALSE(CalibrateReadout({}, adjustment, newest, &map).changed) << "nothing has changed";
+}
+
+TEST(ReadoutCalibration, ReturnsAnEstimateThatIsThePriorOfTheNext) {
+  Map map = MapOf(Scene(6, {0, 0.02}, {0, 0}, 6));
+  const auto newest = [](const Map& of) { return of.keyframes().rbegin()->first; };
+  ReadoutEstimationOptions options;
+  options.prior = CalibrateReadout(options, {}, newest(map), &map).estimate;
+  ASSERT_TRUE(options.prior);
+  EXPECT_GT(options.prior->readout_s.y(), 0.01);
+  const double first_sigma_s = options.prior->sigma_s;
+  for (int round = 0; round < 10; ++round) {
+    AdjustLocally({}, newest(map), nullptr, &map);
+    options.prior = CalibrateReadout(options, {}, newest(map), &map).estimate;
+    ASSERT_TRUE(options.prior);
+  }
+  EXPECT_NEAR(options.prior->readout_s.y(), 0.02, 0.001);
+  EXPECT_LT(options.prior->sigma_s, 0.5 * first_sigma_s);
+  // Keyframes that look as if the shutter were another one hardly change it any more.
+  Map other = MapOf(Scene(6, {0, 0.01}, {0, 0.02}, 6));
+  CalibrateReadout(options, {}, newest(other), &other);
+  EXPECT_NEAR(ReadoutOfNewest(other).y(), 0.02, 0.003);
+  Map global = MapOf(Scene(6, {0, 0}, {0, 0}, 7));
+  EXPECT_FALSE(CalibrateReadout({}, {}, newest(global), &global).estimate);
 }
 
 TEST(ReadoutCalibration, KeepsWhatTheCalibrationStates) {
@@ -210,23 +248,23 @@ TEST(ReadoutCalibration, KeepsWhatTheCalibrationStates) {
   const auto known = std::make_shared<const CameraModel>(kCamera->WithKnownReadout({0, 0.01}));
   for (auto& [id, record] : map.keyframes())
     record.keyframe.camera = CameraModel::WithMotionOf(*record.keyframe.camera, known);
-  EXPECT_FALSE(CalibrateReadout({}, {}, map.keyframes().rbegin()->first, &map));
+  EXPECT_FALSE(CalibrateReadout({}, {}, map.keyframes().rbegin()->first, &map).changed);
   EXPECT_EQ(ReadoutOfNewest(map).y(), 0.01);
 }
 
 TEST(ReadoutCalibration, LeavesAGlobalShutterAndAnUnknownMotionAlone) {
   Map global = MapOf(Scene(6, {0, 0}, {0, 0}, 7));
-  EXPECT_FALSE(CalibrateReadout({}, {}, global.keyframes().rbegin()->first, &global));
+  EXPECT_FALSE(CalibrateReadout({}, {}, global.keyframes().rbegin()->first, &global).changed);
   EXPECT_TRUE(ReadoutOfNewest(global).isZero(0));
   Map unknown = MapOf(Scene(6, {0, 0.02}, {0, 0}, 8));
   for (auto& [id, record] : unknown.keyframes()) record.keyframe.camera = kCamera;
-  EXPECT_FALSE(CalibrateReadout({}, {}, unknown.keyframes().rbegin()->first, &unknown));
-  EXPECT_FALSE(CalibrateReadout({}, {}, 99, &unknown)) << "there is no such keyframe";
+  EXPECT_FALSE(CalibrateReadout({}, {}, unknown.keyframes().rbegin()->first, &unknown).changed);
+  EXPECT_FALSE(CalibrateReadout({}, {}, 99, &unknown).changed) << "there is no such keyframe";
 }
 
 TEST(ReadoutCalibration, DoesNothingWhereItIsDisabled) {
   Map map = MapOf(Scene(6, {0, 0.02}, {0, 0}, 9));
-  EXPECT_FALSE(CalibrateReadout({.enabled = false}, {}, map.keyframes().rbegin()->first, &map));
+  EXPECT_FALSE(CalibrateReadout({.enabled = false}, {}, map.keyframes().rbegin()->first, &map).changed);
 }
 
 }  // namespace
