@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <utility>
 
 #include "engine/base/median.h"
 #include "engine/base/option_check.h"
@@ -36,7 +37,8 @@ ByLens LensDerivatives(const Eigen::Vector2d& u) {
 // is wrong by up to a hundredth.
 constexpr double kFocalSigma = 0.01, kAspectSigma = 0.003, kSkewSigma = 0.003, kCenterSigma = 0.01,
                  kRadialSigma = 0.02, kTangentialSigma = 0.002;
-constexpr double kHuberFactor = 1.345;  // times sigma: 95 % efficiency under Gaussian noise
+// Times sigma: 95 % efficiency under Gaussian noise.
+constexpr double kHuberFactor = 1.345, kCauchyFactor = 2.385;
 // Of the median distance. Weak: it only fixes the scale and keeps corners whose distance is not observable.
 constexpr double kInverseDistanceSigma = 2, kMinInverseDistance = 0.02, kMaxInverseDistance = 50;
 
@@ -45,7 +47,7 @@ constexpr double kInverseDistanceSigma = 2, kMinInverseDistance = 0.02, kMaxInve
 class TrackBundle {
  public:
   TrackBundle(const TrackReadoutOptions& options, const CameraModel& camera, const CornerSequence& sequence)
-      : options_(options), camera_(camera), motions_(sequence.images.size()) {
+      : options_(&options), camera_(&camera), motions_(sequence.images.size()) {
     state_.poses.resize(sequence.images.size());
     for (const CornerSequence::Image& image : sequence.images) {
       const std::size_t k = times_s_.size();
@@ -72,12 +74,25 @@ class TrackBundle {
   std::size_t corners() const { return corners_.size(); }
   double sigma_px() const { return sigma_px_; }
   const Eigen::Vector2d& readout_s() const { return state_.readout_s; }
+  double RobustSigma() const { return std::max(options_->min_noise_px, sigma_px_); }
+  // Instead of Huber's, which is convex and lets the poses converge: gives corners that drift less weight.
+  void UseCauchyLoss() { cauchy_ = true; }
+  double Cost(double sigma) const {
+    double cost = 0;
+    for (const double norm : norms_) cost += Loss(norm / sigma);
+    cost += static_cast<double>(residuals_.size() - norms_.size()) * Loss(kHuberFactor);
+    for (const double inverse : state_.inverse_distances)
+      cost += (inverse - 1) * (inverse - 1) / (kInverseDistanceSigma * kInverseDistanceSigma);
+    return cost + prior_.head<kLens>().dot(state_.lens.cwiseAbs2()) +
+           prior_.tail<2>().dot(state_.readout_s.cwiseAbs2());
+  }
 
   // Levenberg-Marquardt steps, with the readout time of one axis, or with a fixed one.
   void Adjust(std::optional<Eigen::Index> axis, int iterations) {
     constexpr double kNegligible = 1e-3, kMaxDamping = 10;
     Linearize();
     double damping = 1e-3;
+    bool rejected = false;
     for (int i = 0; i < iterations && damping < kMaxDamping; ++i) {
       const double sigma = RobustSigma(), before = Cost(sigma);
       Reduce(sigma);
@@ -89,28 +104,45 @@ class TrackBundle {
         state_ = state;
         Linearize();
         damping *= 10;
+        rejected = true;
         continue;
       }
       if (axis && before - after < kNegligible * std::max(1.0, after)) return;
-      damping = std::max(1e-6, 0.1 * damping);
+      damping = std::max(1e-6, (std::exchange(rejected, false) ? 0.5 : 0.1) * damping);
     }
   }
-  // The best readout time of each axis and its standard deviation, near the present state and with the other
-  // one fixed.
-  struct AxisEstimates {
-    Eigen::Vector2d readout_s, sigma_s;
-  };
-  AxisEstimates Axes() {
+  // By corner, whether it does not belong to a rigid scene, as where a near and a distant edge cross.
+  std::vector<char> Outliers() const {
+    constexpr double kMaxSigmas = 3;  // of the root mean square over the images
+    const std::size_t others = state_.poses.size() - 1;
+    const double threshold = kMaxSigmas * RobustSigma();
+    std::vector<char> outliers;
+    for (std::size_t at = 0; at < residuals_.size(); at += others) {
+      double squares = 0;
+      for (std::size_t k = at; k < at + others; ++k)
+        squares += visible_[k] ? residuals_[k].value.squaredNorm() : threshold * threshold;
+      outliers.push_back(squares > threshold * threshold * static_cast<double>(others));
+    }
+    return outliers;
+  }
+  void Remove(const std::vector<char>& removed) {
+    std::size_t kept = 0;
+    for (std::size_t i = 0; i < corners_.size(); ++i) {
+      if (removed[i]) continue;
+      corners_[kept] = corners_[i];
+      state_.inverse_distances[kept++] = state_.inverse_distances[i];
+    }
+    corners_.resize(kept);
+    state_.inverse_distances.resize(kept);
+  }
+  // Standard deviation of the readout time of an axis, with the other one fixed.
+  double ReadoutSigma(Eigen::Index axis) {
     Reduce(RobustSigma());
-    const Eigen::Index poses = matrix_.rows() - 2;
-    const Eigen::LDLT<Eigen::MatrixXd, Eigen::Lower> factored(
-        Eigen::MatrixXd(matrix_.topLeftCorner(poses, poses)));
-    const Eigen::MatrixXd coupling = matrix_.bottomLeftCorner(2, poses).transpose();
-    const Eigen::MatrixXd solved = factored.solve(coupling);
-    const Eigen::Matrix2d information = matrix_.bottomRightCorner<2, 2>() - coupling.transpose() * solved;
-    const Eigen::Vector2d gradient = gradient_.tail<2>() - solved.transpose() * gradient_.head(poses);
-    return {state_.readout_s - gradient.cwiseQuotient(information.diagonal()),
-            information.diagonal().cwiseSqrt().cwiseInverse()};
+    const Eigen::Index others = matrix_.rows() - 2;
+    const Eigen::LLT<Eigen::MatrixXd, Eigen::Lower> factored(
+        Eigen::MatrixXd(matrix_.topLeftCorner(others, others)));
+    const Eigen::VectorXd coupling = matrix_.row(others + axis).head(others);
+    return 1 / std::sqrt(matrix_(others + axis, others + axis) - coupling.dot(factored.solve(coupling)));
   }
   // As in ReadoutMotion.
   std::vector<Eigen::Vector3d> RotationRates() {
@@ -170,8 +202,16 @@ class TrackBundle {
     motions_.back() = 1.5 * mean(n - 2, n - 1) - 0.5 * mean(n - 3, n - 2);
   }
 
+  double Loss(double x) const {
+    if (cauchy_) return kCauchyFactor * kCauchyFactor * std::log1p(std::pow(x / kCauchyFactor, 2));
+    return x < kHuberFactor ? x * x : kHuberFactor * (2 * x - kHuberFactor);
+  }
+  double LossWeight(double x) const {
+    return cauchy_ ? 1 / (1 + std::pow(x / kCauchyFactor, 2)) : kHuberFactor / std::max(kHuberFactor, x);
+  }
+
   Eigen::Vector2d ImagePoint(const Eigen::Vector2d& pixel) const {
-    const CameraModel::Intrinsics& k = camera_.intrinsics();
+    const CameraModel::Intrinsics& k = camera_->intrinsics();
     return {(pixel.x() - k.cx) / k.fx, (pixel.y() - k.cy) / k.fy};
   }
   Eigen::Vector3d Velocity(std::size_t k, const Eigen::Vector3d& point, double inverse_distance) const {
@@ -183,9 +223,9 @@ class TrackBundle {
     const Corner& corner = corners_[i];
     const double inverse = state_.inverse_distances[i];
     const Eigen::Vector2d measured = corner.seen->pixels[k].cast<double>(),
-                          position = camera_.ReadoutPosition(measured),
+                          position = camera_->ReadoutPosition(measured),
                           first_position =
-                              camera_.ReadoutPosition(corner.seen->pixels.front().cast<double>());
+                              camera_->ReadoutPosition(corner.seen->pixels.front().cast<double>());
     const Eigen::Matrix3d rotation = state_.poses[k].rotation.matrix();
     // The corner at the time of the middle row of the first image, in its camera frame and in that of image
     // k.
@@ -202,11 +242,11 @@ class TrackBundle {
                           exposed = point + out->delay * velocity + 0.5 * out->delay * out->delay * rotated;
     Eigen::Vector2d pixel;
     Eigen::Matrix<double, 2, 3> by_point;
-    if (!camera_.Project(exposed, &pixel, &by_point)) return false;
+    if (!camera_->Project(exposed, &pixel, &by_point)) return false;
     const double scale = std::ldexp(1.0, -corner.seen->level);
     ByLens by_lens = LensDerivatives(ImagePoint(pixel));
-    by_lens.row(0) *= camera_.intrinsics().fx;
-    by_lens.row(1) *= camera_.intrinsics().fy;
+    by_lens.row(0) *= camera_->intrinsics().fx;
+    by_lens.row(1) *= camera_->intrinsics().fy;
     pixel += by_lens * state_.lens;
     by_point *= scale;
     out->value = scale * (pixel - measured);
@@ -261,26 +301,10 @@ class TrackBundle {
     // The median of a squared norm with two degrees of freedom is 2 ln 2 variances.
     sigma_px_ = Median(norms_) / std::sqrt(2 * std::log(2.0));
   }
-  double RobustSigma() const { return std::max(options_.min_noise_px, sigma_px_); }
-  // With Huber's loss.
-  double Cost(double sigma) const {
-    double cost = 0;
-    for (const double norm : norms_) {
-      const double x = norm / sigma;
-      cost += x < kHuberFactor ? x * x : kHuberFactor * (2 * x - kHuberFactor);
-    }
-    cost += static_cast<double>(residuals_.size() - norms_.size()) * kHuberFactor * kHuberFactor;
-    for (const double inverse : state_.inverse_distances)
-      cost += (inverse - 1) * (inverse - 1) / (kInverseDistanceSigma * kInverseDistanceSigma);
-    return cost + prior_.head<kLens>().dot(state_.lens.cwiseAbs2()) +
-           prior_.tail<2>().dot(state_.readout_s.cwiseAbs2());
-  }
-
   // The normal equations with the inverse distances eliminated: all poses but the first, then both axes of
   // the readout time.
   void Reduce(double sigma) {
     const std::size_t n = state_.poses.size();
-    const double threshold = kHuberFactor * sigma;
     const auto size = static_cast<Eigen::Index>(6 * (n - 1)) + kShared;
     matrix_.setZero(size, size);
     gradient_.setZero(size);
@@ -294,7 +318,7 @@ class TrackBundle {
         const std::size_t at = i * (n - 1) + k - 1;
         if (!visible_[at]) continue;
         const Residual& r = residuals_[at];
-        const double weight = std::min(1.0, threshold / std::max(r.value.norm(), 1e-12)) / (sigma * sigma);
+        const double weight = LossWeight(r.value.norm() / sigma) / (sigma * sigma);
         CollectBlocks(k, r);
         for (const PoseBlock& block : blocks_) {
           const auto row = static_cast<Eigen::Index>(6 * (block.image - 1));
@@ -341,7 +365,7 @@ class TrackBundle {
       matrix(poses + a, poses + a) = 1;
       gradient[poses + a] = 0;
     }
-    const Eigen::VectorXd step = -matrix.ldlt().solve(gradient);
+    const Eigen::VectorXd step = -matrix.llt().solve(gradient);
     if (!step.allFinite()) return;
     for (std::size_t k = 1; k < state_.poses.size(); ++k) {
       const auto at = static_cast<Eigen::Index>(6 * (k - 1));
@@ -363,12 +387,13 @@ class TrackBundle {
     if (axis) state_.readout_s[*axis] += std::clamp(step[poses + *axis], -kMaxStep_s, kMaxStep_s);
   }
 
-  const TrackReadoutOptions& options_;
-  const CameraModel& camera_;
+  const TrackReadoutOptions* options_;
+  const CameraModel* camera_;
   std::vector<double> times_s_;
   State state_;
   std::vector<Twist> motions_;  // left twist per second
   std::vector<Corner> corners_;
+  bool cauchy_ = false;  // otherwise Huber's loss
   double sigma_px_ = 0;
   std::vector<double> norms_;                // of the residuals that are visible
   std::vector<Weights> weights_;             // by image
@@ -383,6 +408,16 @@ class TrackBundle {
   std::vector<double> hessians_, gradients_;
 };
 
+struct BetterAxis {
+  std::size_t axis = 0;
+  double cost_ratio = 1;  // of the other one
+};
+BetterAxis FindBetterAxis(const std::array<TrackBundle, 2>& bundles) {
+  const double sigma_px = std::min(bundles[0].RobustSigma(), bundles[1].RobustSigma()),
+               rows = bundles[0].Cost(sigma_px), columns = bundles[1].Cost(sigma_px);
+  return rows < columns ? BetterAxis{0, columns / rows} : BetterAxis{1, rows / columns};
+}
+
 }  // namespace
 
 std::optional<std::string> TrackReadoutOptions::Validate() const {
@@ -392,7 +427,10 @@ std::optional<std::string> TrackReadoutOptions::Validate() const {
       .AtLeast(min_images, 4, "number of images that tell the readout time")
       .Positive(prior_sigma_s, "sigma of an unknown readout time")
       .Positive(min_noise_px, "smallest noise of a corner")
+      .AtLeast(systematic_s_per_px, 0, "systematic error of a readout time")
       .AtLeast(max_noise_px, min_noise_px, "largest noise of a corner")
+      .AtLeast(min_readout_sigmas, 0, "significance of a readout time")
+      .AtLeast(min_readout_s, 0, "smallest readout time")
       .fault();
 }
 
@@ -401,18 +439,41 @@ std::optional<TrackReadout> EstimateTrackReadout(const TrackReadoutOptions& opti
   if (static_cast<int>(sequence.images.size()) < options.min_images ||
       static_cast<int>(sequence.corners.size()) < options.min_corners)
     return std::nullopt;
-  TrackBundle bundle(options, camera, sequence);
-  if (static_cast<int>(bundle.corners()) < options.min_corners) return std::nullopt;
-  constexpr int kGlobalShutterSteps = 4, kSteps = 40;
-  bundle.Adjust(std::nullopt, kGlobalShutterSteps);
-  const TrackBundle::AxisEstimates axes = bundle.Axes();
-  const Eigen::Vector2d significance = axes.readout_s.cwiseAbs().cwiseQuotient(axes.sigma_s);
-  const Eigen::Index axis = significance.x() > significance.y() ? 0 : 1;
-  bundle.Adjust(axis, kSteps);
+  constexpr int kGlobalShutterSteps = 4, kFirstSteps = 4, kSteps = 40;
+  const TrackBundle initial(options, camera, sequence);
+  if (static_cast<int>(initial.corners()) < options.min_corners) return std::nullopt;
+  // While the poses are not right yet, the significance of an axis misleads: both are adjusted until one fits
+  // clearly better.
+  constexpr double kClearly = 2;
+  std::array<TrackBundle, 2> bundles = {initial, initial};
+  std::vector<std::size_t> axes = {0, 1};
+  const auto adjust = [&](std::size_t axis, int steps) {
+    bundles[axis].Adjust(static_cast<Eigen::Index>(axis), steps);
+  };
+  for (const std::size_t axis : axes) {
+    bundles[axis].Adjust(std::nullopt, kGlobalShutterSteps);
+    adjust(axis, kFirstSteps);
+  }
+  if (const BetterAxis first = FindBetterAxis(bundles); first.cost_ratio > kClearly) axes = {first.axis};
+  std::vector<char> outliers(initial.corners(), 1);
+  for (const std::size_t axis : axes) {
+    adjust(axis, kSteps);
+    const std::vector<char> found = bundles[axis].Outliers();
+    for (std::size_t i = 0; i < outliers.size(); ++i) outliers[i] = outliers[i] && found[i];
+  }
+  for (const std::size_t axis : axes) {
+    bundles[axis].Remove(outliers);
+    if (static_cast<int>(bundles[axis].corners()) < options.min_corners) return std::nullopt;
+    bundles[axis].UseCauchyLoss();
+    adjust(axis, kSteps);
+  }
+  const std::size_t axis = axes.size() == 1 ? axes.front() : FindBetterAxis(bundles).axis;
+  TrackBundle& bundle = bundles[axis];
   TrackReadout result;
   result.readout_s = bundle.readout_s();
-  result.sigma_s = bundle.Axes().sigma_s[axis];
   result.noise_px = bundle.sigma_px();
+  result.sigma_s = std::hypot(bundle.ReadoutSigma(static_cast<Eigen::Index>(axis)),
+                              options.systematic_s_per_px * bundle.RobustSigma());
   for (const CornerSequence::Image& image : sequence.images) result.times.push_back(image.time);
   result.rotation_rates = bundle.RotationRates();
   const double interval_s = ToSeconds(sequence.images.back().time - sequence.images.front().time) /
@@ -424,6 +485,13 @@ std::optional<TrackReadout> EstimateTrackReadout(const TrackReadoutOptions& opti
   const bool fits = result.noise_px <= options.max_noise_px && result.readout_s.allFinite() &&
                     std::isfinite(result.sigma_s);
   return fits ? std::optional(std::move(result)) : std::nullopt;
+}
+
+std::optional<ReadoutPrior> SignificantReadout(const TrackReadoutOptions& options,
+                                               const TrackReadout& estimate) {
+  const double smallest = std::max(options.min_readout_s, options.min_readout_sigmas * estimate.sigma_s);
+  if (estimate.readout_s.norm() < smallest) return std::nullopt;
+  return ReadoutPrior{estimate.readout_s, estimate.sigma_s};
 }
 
 }  // namespace docent::engine
