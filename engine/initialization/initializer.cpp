@@ -17,6 +17,10 @@ constexpr double kMotionShare = 0.2, kParallaxShare = 0.6;
 // Displacement of the first and the last row by a rolling shutter, pixels.
 constexpr double kNegligiblePx = 0.5;
 
+// After a pair, the readout time is estimated from so many images and multiples of it.
+constexpr int kImagesBetweenSequences = 8;
+constexpr int kMostImages = static_cast<int>(CornerTracks::kRememberedImages);
+
 using Rays = std::vector<Eigen::Vector3d>;
 
 // Adds the rays of a match. False if one of the pixels has none.
@@ -41,8 +45,6 @@ std::optional<std::string> InitializerOptions::Validate() const {
       .AtLeast(min_motion_px, 0, "motion between two views")
       .AtLeast(attempt_interval, 1, "interval between two estimates")
       .AtLeast(unknown_readout_s, 0, "unknown readout time")
-      .AtLeast(min_readout_sigmas, 0, "significance of a readout time")
-      .AtLeast(min_readout_s, 0, "smallest readout time")
       .Contained(tracks.Validate())
       .Contained(track_readout.Validate())
       .Contained(two_view.Validate())
@@ -66,6 +68,11 @@ void Initializer::SetCamera(std::shared_ptr<const CameraModel> camera) {
 
 void Initializer::Reset() {
   tracks_.Reset();
+  ResetAttempts();
+  ended_ = following_ = false;
+}
+
+void Initializer::ResetAttempts() {
   for (StartConfirmation& confirmation : confirmations_) confirmation.Reset();
   hint_ = Hint::kNone;
   progress_ = 0;
@@ -78,8 +85,9 @@ void Initializer::UpdateProgress(double progress) {
 
 std::optional<InitialPair> Initializer::Track(Timestamp time,
                                               const std::shared_ptr<const ImageFeatures>& features) {
+  if (ended_) Reset();
   if (tracks_.started()) {
-    tracks_.Track(time, features, *camera_, AlignedRotation(*tracks_.newest(), *features, *camera_));
+    TrackCorners(time, features);
   } else {
     tracks_.Start(time, features);
   }
@@ -93,7 +101,8 @@ std::optional<InitialPair> Initializer::Track(Timestamp time,
     if (first.age_frames == 0) confirmations_[first.slot].Reset();
     if (first.age_frames == 0 || first.age_frames % options_.attempt_interval != 0) continue;
     if (auto pair = Attempt(first, time, features)) {
-      Reset();
+      ResetAttempts();
+      ended_ = true;
       return pair;
     }
     if (&first == &tracks_.views().front()) of_oldest = hint_;
@@ -102,6 +111,38 @@ std::optional<InitialPair> Initializer::Track(Timestamp time,
   hint_ = of_oldest;
   if (progress >= 0) UpdateProgress(progress);
   return std::nullopt;
+}
+
+void Initializer::TrackCorners(Timestamp time, const std::shared_ptr<const ImageFeatures>& features) {
+  tracks_.Track(time, features, *camera_, AlignedRotation(*tracks_.newest(), *features, *camera_));
+}
+
+void Initializer::EndWith(const InitialPair& pair) {
+  const bool may_tell = options_.estimate_readout && !camera_->known_readout_s() && readout_s_.isZero(0) &&
+                        !pair.readout && tracks_.started() &&
+                        tracks_.views().front().age_frames + 1 < kMostImages;
+  if (!may_tell) {
+    Reset();
+    return;
+  }
+  ended_ = following_ = true;
+}
+
+std::optional<TrackedCorners> Initializer::Follow(Timestamp time,
+                                                  const std::shared_ptr<const ImageFeatures>& features) {
+  const Timestamp first = tracks_.views().front().time;
+  TrackCorners(time, features);
+  const CornerTracks::FirstView& view = tracks_.views().front();
+  if (view.time != first) {
+    Reset();
+    return std::nullopt;
+  }
+  const int images = view.age_frames + 1;
+  if (images < options_.track_readout.min_images || images % kImagesBetweenSequences != 0)
+    return std::nullopt;
+  TrackedCorners corners{camera_, tracks_.Sequence(view)};
+  if (images == kMostImages) Reset();
+  return corners;
 }
 
 std::shared_ptr<const CameraModel> Initializer::ImageCamera(const Eigen::Vector3d& newest,
@@ -174,9 +215,8 @@ std::optional<TrackReadout> Initializer::ReadoutFromCorners() const {
 }
 
 bool Initializer::UseReadout(const TrackReadout& readout, MatchedViews* views) {
-  const double smallest = std::max(options_.min_readout_s, options_.min_readout_sigmas * readout.sigma_s);
-  if (readout.readout_s.norm() < smallest) return false;
-  views->readout = {readout.readout_s, readout.sigma_s};
+  views->readout = SignificantReadout(options_.track_readout, readout);
+  if (!views->readout) return false;
   readout_s_ = readout.readout_s;
   for (InitialPair::View* view : {&views->a, &views->b}) {
     const auto image = std::ranges::find(readout.times, view->time);

@@ -28,10 +28,6 @@ struct InitializerOptions {
   // Whether the readout time is estimated from the corners before the first map; not while the calibration of
   // the camera is unknown, since its errors look alike.
   bool estimate_readout = true;
-  // The readout time that the corners tell is used once it differs from zero by this many standard deviations
-  // and seconds. Errors of a calibration looked like up to 3.5 ms in real recordings; this is twice that.
-  double min_readout_sigmas = 3;
-  double min_readout_s = 0.007;
   TrackReadoutOptions track_readout;
   TwoViewOptions two_view;
   StartConfirmationOptions confirmation;
@@ -58,7 +54,7 @@ class Initializer {
   void SetCamera(std::shared_ptr<const CameraModel> camera);
   // The readout time of the rolling shutter; see ReadoutMotion.
   void SetReadout(const Eigen::Vector2d& readout_s) { readout_s_ = readout_s; }
-  // Returns a pair once the geometry is reliable and confirmed, and then resets itself.
+  // Returns a pair once the geometry is reliable and confirmed; the next call starts again.
   std::optional<InitialPair> Track(Timestamp time, const std::shared_ptr<const ImageFeatures>& features);
 
   // The same for two views whose keypoints the caller has matched, such as the points of a panorama map in
@@ -71,6 +67,13 @@ class Initializer {
   // What the corners tell that are tracked since the oldest first view. Empty if they do not tell it, or if
   // the calibration of the camera states it.
   std::optional<TrackReadout> ReadoutFromCorners() const;
+  // The search ended with this pair, or with one of other views of the camera. If it does not know the
+  // readout time, the corners are tracked on through the next images, which may tell it.
+  void EndWith(const InitialPair& pair);
+  bool is_following() const { return following_; }
+  // To be called for each image while is_following(). Returns the corners where their number of images tells
+  // more than before.
+  std::optional<TrackedCorners> Follow(Timestamp time, const std::shared_ptr<const ImageFeatures>& features);
 
   // Whether the views that were tried last have depth, which a third view has yet to confirm.
   bool awaits_confirmation() const { return awaits_confirmation_; }
@@ -109,6 +112,8 @@ class Initializer {
   std::shared_ptr<const CameraModel> ImageCamera(const Eigen::Vector3d& newest,
                                                  const Eigen::Vector3d& other) const;
   void UpdateProgress(double progress);
+  void ResetAttempts();
+  void TrackCorners(Timestamp time, const std::shared_ptr<const ImageFeatures>& features);
 
   InitializerOptions options_;
   std::shared_ptr<const CameraModel> camera_;
@@ -120,6 +125,8 @@ class Initializer {
   Hint hint_ = Hint::kNone;
   double progress_ = 0, attempt_progress_ = 0;  // attempt_progress_: of the last attempt alone
   bool awaits_confirmation_ = false;
+  bool ended_ = false;      // with a pair
+  bool following_ = false;  // tracks the corners after the pair
 };
 
 }  // namespace docent::engine

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <utility>
 
+#include "engine/map/map_readout.h"
 #include "engine/mapping/calibration/readout_calibration.h"
 
 namespace docent::engine {
@@ -72,6 +73,17 @@ bool MapRefinement::AdjustToReadout() {
   AdjustLocally(options_.adjustment, newest_, interrupt_, &workspace_->map);
   RequireGlobalAdjustment();
   return true;
+}
+
+void MapRefinement::EstimateReadout(const TrackedCorners& corners) {
+  const auto used = ReadoutIn(workspace_->map, *corners.camera);
+  const bool known = FindKnownReadout(*corners.camera) != known_readouts_.end();
+  if (!MayEstimateReadout() || known || !used || !used->isZero(0)) return;
+  const auto estimate = EstimateTrackReadout(options_.track_readout, *corners.camera, corners.sequence);
+  const auto prior = estimate ? SignificantReadout(options_.track_readout, *estimate) : std::nullopt;
+  if (!prior) return;
+  SetReadoutPrior(prior, corners.camera);
+  if (AdjustToReadout()) output_->Publish(workspace_->map.Snapshot());
 }
 
 bool MapRefinement::UpdateReadout() {

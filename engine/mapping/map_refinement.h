@@ -9,6 +9,7 @@
 #include <utility>
 #include <vector>
 
+#include "engine/initialization/track_readout.h"
 #include "engine/mapping/map_workspace.h"
 #include "engine/mapping/mapper_options.h"
 #include "engine/mapping/mapper_output.h"
@@ -52,6 +53,8 @@ class MapRefinement {
   void AdjustAroundNewest();
   // What is known of the readout time of a lens without the map.
   void SetReadoutPrior(const std::optional<ReadoutPrior>& prior, std::shared_ptr<const CameraModel> lens);
+  // The same from corners, if nothing is known yet: adjusts the map if they tell the readout time.
+  void EstimateReadout(const TrackedCorners& corners);
   // Estimates the readout time of the newest keyframe's camera. True if it changed, so that the map has to be
   // adjusted.
   bool UpdateReadout();

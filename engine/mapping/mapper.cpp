@@ -29,9 +29,10 @@ void StoreImages(ImageStore* store, MapperQueue::Request* request) {
     keep(&candidate->features);
     return;
   }
-  auto& pair = std::get<InitialPair>(*request);
-  keep(&pair.a.features);
-  keep(&pair.b.features);
+  if (auto* pair = std::get_if<InitialPair>(request)) {
+    keep(&pair->a.features);
+    keep(&pair->b.features);
+  }
 }
 
 }  // namespace
@@ -109,6 +110,10 @@ void Mapper::Serve(MapperQueue::Request request) {
   StoreImages(options_.images.get(), &request);
   if (const auto* pair = std::get_if<InitialPair>(&request)) {
     creation_.CreateFromPair(*pair);
+    return;
+  }
+  if (const auto* corners = std::get_if<TrackedCorners>(&request)) {
+    refinement_.EstimateReadout(*corners);
     return;
   }
   const auto& candidate = std::get<KeyFrameCandidate>(request);

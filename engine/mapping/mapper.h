@@ -29,9 +29,11 @@ class Mapper {
   // seconds; must not be called during a Step(). interrupt may be null.
   MapJoinAttempt Join(const MapSnapshot& other, const std::atomic<bool>* interrupt);
 
-  // Both return false if the queue is full. The times of the keyframes of one map ascend.
+  // They return false if the queue is full. The times of the keyframes of one map ascend.
   bool Offer(KeyFrameCandidate candidate) { return queue_.Offer(std::move(candidate)); }
   bool Start(InitialPair pair) { return queue_.Offer(std::move(pair)); }
+  // Corners of images before the map knew the readout time of their camera.
+  bool Offer(TrackedCorners corners) { return queue_.Offer(std::move(corners)); }
   void Report(std::vector<PointReport> reports) { queue_.Report(std::move(reports)); }
   std::size_t QueueLength() const { return queue_.Length(); }
 

@@ -27,6 +27,8 @@ std::optional<std::string> MapperOptions::Validate() const {
       .Contained(loops.Validate())
       .Contained(joining.Validate())
       .Contained(lens.Validate())
+      .Contained(readout.Validate())
+      .Contained(track_readout.Validate())
       .Contained(search.Validate())
       .fault();
 }

@@ -6,6 +6,7 @@
 #include <optional>
 #include <string>
 
+#include "engine/initialization/track_readout.h"
 #include "engine/mapping/bundle/map_adjustment.h"
 #include "engine/mapping/calibration/lens_estimation.h"
 #include "engine/mapping/calibration/readout_estimation.h"
@@ -44,7 +45,8 @@ struct MapperOptions {
   LoopOptions loops;
   MapJoiningOptions joining;
   LensEstimationOptions lens;
-  ReadoutEstimationOptions readout;  // of a rolling shutter
+  ReadoutEstimationOptions readout;   // of a rolling shutter, from the map
+  TrackReadoutOptions track_readout;  // from corners
   SearchOptions search;
   // Whether the adopted map is only extended for a while: its keyframes keep their poses, no more than
   // max_temporary_keyframes of the added ones are kept, and neither loops, lenses nor the whole map are

@@ -10,6 +10,7 @@
 #include <variant>
 #include <vector>
 
+#include "engine/initialization/track_readout.h"
 #include "engine/mapping/keyframe_candidate.h"
 
 namespace docent::engine {
@@ -19,8 +20,8 @@ namespace docent::engine {
 // thread, but work begins and ends on the stepping thread.
 class MapperQueue {
  public:
-  // A keyframe to be inserted, or two views that start a map.
-  using Request = std::variant<KeyFrameCandidate, InitialPair>;
+  // A keyframe to be inserted, two views that start a map, or corners that tell the readout time of a camera.
+  using Request = std::variant<KeyFrameCandidate, InitialPair, TrackedCorners>;
 
   // max_length: requests that wait at most.
   explicit MapperQueue(std::size_t max_length) : max_length_(max_length) {}

@@ -93,6 +93,15 @@ bool MappingThread::Offer(std::uint64_t key, KeyFrameCandidate candidate, std::v
   return true;
 }
 
+void MappingThread::EstimateReadout(std::uint64_t key, TrackedCorners corners) {
+  {
+    const std::scoped_lock lock(mutex_);
+    if (key != requested_key_ || adoption_ || !mapper_.Offer(std::move(corners))) return;
+    has_work_ = true;
+  }
+  changed_.notify_all();
+}
+
 void MappingThread::ApplyAdoption() {
   std::unique_lock lock(mutex_);
   while (adoption_) {

@@ -55,6 +55,8 @@ class MappingThread {
   void Join(std::uint64_t key, std::uint64_t number, std::shared_ptr<const MapSnapshot> other);
   // Returns false when the mapper is busy or works on another map.
   bool Offer(std::uint64_t key, KeyFrameCandidate candidate, std::vector<PointReport> reports);
+  // Estimates the readout time of a camera; nothing happens where Offer would return false.
+  void EstimateReadout(std::uint64_t key, TrackedCorners corners);
 
   // Lockstep only: runs steps until no urgent work is left (at most kMaxSteps), then one step of idle work.
   void RunLockstep();

@@ -112,7 +112,8 @@ void System::OfferToMapper(std::size_t index, const TrackedFrame& frame) {
   Tracker& tracker = *state_.cameras[index].tracker;
   std::optional<InitialPair> pair = tracker.TakeInitialPair();
   std::optional<KeyFrameCandidate> candidate = tracker.TakeKeyFrameCandidate();
-  if (!pair && !candidate) return;
+  std::optional<TrackedCorners> corners = tracker.TakeCorners();
+  if (!pair && !candidate && !corners) return;
   std::uint64_t key = 0;
   {
     const std::scoped_lock lock(mutex_);
@@ -126,6 +127,7 @@ void System::OfferToMapper(std::size_t index, const TrackedFrame& frame) {
     if (pair && found->second.snapshot && found->second.snapshot->HasFinitePoints()) return;
     if (candidate && !policy_.MayAddKeyFrame(found->second, frame.camera_from_map)) candidate.reset();
   }
+  if (corners) mapping_.EstimateReadout(key, std::move(*corners));
   if (!pair && !candidate) return;
   bool accepted = false;
   if (pair) {

@@ -150,6 +150,7 @@ void MapInitialization::Search(const CameraImage& image, const MapSnapshot* map,
   if (!pair_ && map && posed && directions && !target_initializer_)
     pair_ = TryWideBaseline(image, rotation_rate, *out);
   if (pair_) phase_ = Phase::kPairGiven;
+  if (pair_ && !target_initializer_) initializer_.EndWith(*pair_);
   if (!target_initializer_) out->initialization_progress = pair_ ? 1 : initializer_.progress();
   if (NewestFirstView() == image.time) RememberFirstView(image.time, posed ? out->camera_from_map : Rigid3());
 }

@@ -57,6 +57,11 @@ class MapInitialization {
   // The pair that the last frame completed, once.
   std::optional<InitialPair> TakePair() { return std::exchange(pair_, std::nullopt); }
   void BeginFrame() { pair_.reset(); }
+  // To be called for each frame after the one that completed the pair: its corners, now and then, from which
+  // the mapper estimates the readout time of the shutter.
+  std::optional<TrackedCorners> FollowCorners(const CameraImage& image) {
+    return initializer_.is_following() ? initializer_.Follow(image.time, image.features) : std::nullopt;
+  }
 
   Phase phase() const { return phase_; }
   bool is_on() const { return phase_ != Phase::kOff; }

@@ -124,6 +124,7 @@ void Tracker::Track(const Frame& frame, const PlaceFinder* places, TrackedFrame*
   image_.previous = std::exchange(image_.features, nullptr);
   image_.features = extractor_.Extract(frame.image);
   searched_ = map_ && IsTracked(state_);
+  corners_ = initialization_.FollowCorners(image_);
 
   switch (state_) {
     case CameraState::kStarting:

@@ -87,6 +87,8 @@ class Tracker {
   }
   void KeyFrameAccepted();
   std::optional<InitialPair> TakeInitialPair() { return initialization_.TakePair(); }
+  // Corners of the last images, from which the mapper estimates the readout time of the shutter.
+  std::optional<TrackedCorners> TakeCorners() { return std::exchange(corners_, std::nullopt); }
   std::vector<PointReport> TakeReports() { return reports_.Take(); }
 
  private:
@@ -123,7 +125,8 @@ class Tracker {
   std::shared_ptr<const MapSnapshot> map_;
   std::uint64_t map_key_ = 0;
   bool search_known_maps_ = false;
-  CameraImage image_;      // the last one
+  CameraImage image_;  // the last one
+  std::optional<TrackedCorners> corners_;
   bool searched_ = false;  // whether a map was searched in it
 };
 

@@ -84,6 +84,46 @@ TEST(Initializer, ReturnsTheTrueGeometryAfterSidewaysMotion) {
   }
 }
 
+// The lengths of the sequences of corners that follow a pair.
+std::vector<std::size_t> FollowedLengths(const InitializerOptions& options,
+                                         const std::shared_ptr<const CameraModel>& camera) {
+  const RenderedWorld world = RenderedWorld::Room(51);
+  Initializer initializer(options, camera, 5);
+  std::vector<std::size_t> lengths;
+  std::optional<InitialPair> pair;
+  for (int i = 0; i < 60; ++i) {
+    const auto features = MakeFeatures(
+        world.Render(*Camera(), CameraAt({0.012 * i, 0, 0}), 1.5, static_cast<std::uint64_t>(i) + 1));
+    const Timestamp time = FromSeconds(i / 30.0);
+    if (!pair) {
+      pair = initializer.Track(time, features);
+      if (pair) initializer.EndWith(*pair);
+    } else if (initializer.is_following()) {
+      const auto corners = initializer.Follow(time, features);
+      if (!corners) continue;
+      EXPECT_EQ(corners->sequence.images.back().time, time);
+      EXPECT_EQ(corners->sequence.images.front().time, pair->a.time) << "the same first view";
+      EXPECT_GT(corners->sequence.corners.size(), 40u);
+      lengths.push_back(corners->sequence.images.size());
+    }
+  }
+  EXPECT_TRUE(pair);
+  EXPECT_FALSE(initializer.is_following());
+  return lengths;
+}
+
+TEST(Initializer, FollowsTheCornersAfterAPairThatDoesNotKnowTheReadoutTime) {
+  InitializerOptions options;
+  const auto lengths = FollowedLengths(options, Camera());
+  ASSERT_FALSE(lengths.empty());
+  EXPECT_TRUE(std::ranges::is_sorted(lengths));
+  EXPECT_EQ(lengths.back(), CornerTracks::kRememberedImages);
+  options.estimate_readout = false;
+  EXPECT_TRUE(FollowedLengths(options, Camera()).empty()) << "it is not to be estimated";
+  const auto known = std::make_shared<const CameraModel>(Camera()->WithKnownReadout({0, 0}));
+  EXPECT_TRUE(FollowedLengths({}, known).empty()) << "the calibration states it";
+}
+
 TEST(Initializer, ProgressGrowsWithTheBaselineAndStaysSmallUnderRotation) {
   const RenderedWorld world = RenderedWorld::Room(51);
   const ShownFrames moved = Show(world, 60, [](int i) { return CameraAt({0.012 * i, 0, 0}); });

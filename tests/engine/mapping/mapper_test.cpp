@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "engine/vision/features.h"
+#include "tests/engine/initialization/rolled_scene.h"
 #include "tests/engine/mapping/true_pair.h"
 #include "tests/engine/rendered_world.h"
 
@@ -169,6 +170,35 @@ TEST_F(MapperTest, ExtendsTheMapByKeyframesUntilIdle) {
   EXPECT_LT(MedianDistanceToSurface(*mapper.Snapshot()), 0.04);
   EXPECT_GT(mapper.Times().bundle_adjustment, 0);
   EXPECT_GT(mapper.Times().other, 0);
+}
+
+TEST_F(MapperTest, LearnsTheReadoutTimeFromCornersAfterItsStart) {
+  InitialPair pair = *pair_;
+  const auto camera = [](double rate) {
+    return std::make_shared<CameraModel>(
+        CameraModel::WithReadout(MapperCamera(), {{0, rate, 0}, Eigen::Vector2d::Zero()}));
+  };
+  pair.a.camera = camera(0.2);
+  pair.b.camera = camera(-0.2);
+  testing_world::RolledScene scene;
+  scene.camera = *MapperCamera();
+  const TrackedCorners corners{MapperCamera(), ShowCorners(scene)};
+  const auto readout = [](const Mapper& mapper) -> Eigen::Vector2d {
+    return mapper.Snapshot()->keyframes.back().camera->readout_motion().readout_s;
+  };
+  Mapper mapper({});
+  mapper.Offer(corners);
+  WorkUntilIdle(&mapper);
+  EXPECT_EQ(mapper.Snapshot(), nullptr) << "there is no map yet";
+  mapper.Start(pair);
+  WorkUntilIdle(&mapper);
+  ASSERT_NE(mapper.Snapshot(), nullptr);
+  ASSERT_TRUE(readout(mapper).isZero(0));
+  mapper.Offer(corners);
+  WorkUntilIdle(&mapper);
+  EXPECT_NEAR(readout(mapper).y(), 0.02, 0.004);
+  EXPECT_EQ(readout(mapper).x(), 0);
+  EXPECT_EQ(Validate(*mapper.Snapshot()), "");
 }
 
 TEST_F(MapperTest, AcceptsNoMoreThanItsQueueHolds) {
