@@ -94,7 +94,8 @@ bool MapRefinement::UpdateReadout() {
   const auto known = FindKnownReadout(*camera);
   if (known != known_readouts_.end()) options.prior = known->prior;
   const ReadoutCalibration result = CalibrateReadout(options, options_.adjustment, newest_, &workspace_->map);
-  if (result.estimate) SetReadoutPrior(result.estimate, camera);
+  // Without the corners, it may be an error of the calibration that the next keyframes reveal.
+  if (result.estimate && options.prior) SetReadoutPrior(result.estimate, camera);
   return result.changed;
 }
 
