@@ -51,9 +51,9 @@ class MapRefinement {
   // Searches the new points in the keyframes that share most points with the newest one.
   void MatchNewPoints();
   void AdjustAroundNewest();
-  // What is known of the readout time of a lens without the map.
+  // What the corners of the initialization tell of the readout time of a lens.
   void SetReadoutPrior(const std::optional<ReadoutPrior>& prior, std::shared_ptr<const CameraModel> lens);
-  // The same from corners, if nothing is known yet: adjusts the map if they tell the readout time.
+  // Estimates the readout time from corners if it is not known yet, and adjusts the map if it changes.
   void EstimateReadout(const TrackedCorners& corners);
   // Estimates the readout time of the newest keyframe's camera. True if it changed, so that the map has to be
   // adjusted.
@@ -63,8 +63,8 @@ class MapRefinement {
   void CullRedundantKeyFrame();
 
  private:
-  // What is known of the readout time of a lens: a constant of it, so that each estimate is the prior of the
-  // next. In a fast pan the newest keyframes alone were wrong by 6 ms.
+  // The readout time of a lens once corners have told it. It is a constant, so each estimate is the prior of
+  // the next: in a fast pan the newest keyframes alone were wrong by 6 ms.
   struct KnownReadout {
     std::shared_ptr<const CameraModel> lens;
     ReadoutPrior prior;
@@ -72,7 +72,7 @@ class MapRefinement {
   // Whether the readout time may be estimated: the errors of a calibration that is not known yet look alike.
   bool MayEstimateReadout() const { return !options_.temporary && options_.lens.lenses.empty(); }
   std::vector<KnownReadout>::iterator FindKnownReadout(const CameraModel& lens);
-  // After a local adjustment: the same with a new readout time. True if that has changed.
+  // Estimates the readout time and adjusts the map again if it changed, which is returned.
   bool AdjustToReadout();
   const MapperOptions& options_;
   const std::atomic<bool>* const interrupt_;
