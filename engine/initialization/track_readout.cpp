@@ -442,11 +442,12 @@ std::optional<TrackReadout> EstimateTrackReadout(const TrackReadoutOptions& opti
   constexpr int kGlobalShutterSteps = 4, kFirstSteps = 4, kSteps = 40;
   const TrackBundle initial(options, camera, sequence);
   if (static_cast<int>(initial.corners()) < options.min_corners) return std::nullopt;
-  // While the poses are not right yet, the significance of an axis misleads: both are adjusted until one fits
-  // clearly better.
+  // While the poses are not right yet, the significance of an axis misleads: where either is possible, both
+  // are adjusted until one fits clearly better.
   constexpr double kClearly = 2;
   std::array<TrackBundle, 2> bundles = {initial, initial};
   std::vector<std::size_t> axes = {0, 1};
+  if (const auto known = ReadoutAxis(camera)) axes = {static_cast<std::size_t>(*known)};
   const auto adjust = [&](std::size_t axis, int steps) {
     bundles[axis].Adjust(static_cast<Eigen::Index>(axis), steps);
   };
@@ -454,7 +455,10 @@ std::optional<TrackReadout> EstimateTrackReadout(const TrackReadoutOptions& opti
     bundles[axis].Adjust(std::nullopt, kGlobalShutterSteps);
     adjust(axis, kFirstSteps);
   }
-  if (const BetterAxis first = FindBetterAxis(bundles); first.cost_ratio > kClearly) axes = {first.axis};
+  if (axes.size() > 1) {
+    const BetterAxis first = FindBetterAxis(bundles);
+    if (first.cost_ratio > kClearly) axes = {first.axis};
+  }
   std::vector<char> outliers(initial.corners(), 1);
   for (const std::size_t axis : axes) {
     adjust(axis, kSteps);

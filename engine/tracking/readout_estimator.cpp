@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "engine/base/option_check.h"
+#include "engine/geometry/readout_prior.h"
 
 namespace docent::engine {
 
@@ -83,7 +84,7 @@ void ReadoutEstimator::Add(const CameraModel& camera, const Rigid3& camera_from_
   information_ += scale * equations->information;
   // The residuals remain after the readout time that the camera has already.
   weighted_ += scale * (equations->gradient + equations->information * motion.readout_s);
-  Use(frame_s);
+  Use(ReadoutAxis(camera), frame_s);
 }
 
 Eigen::Matrix2d ReadoutEstimator::Covariance() const {
@@ -99,9 +100,10 @@ Eigen::Vector2d ReadoutEstimator::sigma_s() const {
   return Covariance().diagonal().cwiseSqrt();
 }
 
-void ReadoutEstimator::Use(double frame_s) {
+void ReadoutEstimator::Use(std::optional<Eigen::Index> only, double frame_s) {
   const Eigen::Vector2d estimate = estimate_s(), sigma = sigma_s();
-  for (int axis = 0; axis < 2; ++axis) {
+  for (Eigen::Index axis = 0; axis < 2; ++axis) {
+    if (axis != only.value_or(axis)) continue;
     const double value = std::clamp(estimate[axis], -frame_s, frame_s);
     const double change = std::max(options_.min_change_s, sigma[axis]);
     const double smallest = std::max(options_.min_readout_s, options_.min_sigmas * sigma[axis]);

@@ -55,7 +55,7 @@ class ReadoutEstimator {
 
  private:
   Eigen::Matrix2d Covariance() const;
-  void Use(double frame_s);
+  void Use(std::optional<Eigen::Index> only, double frame_s);
 
   ReadoutOptions options_;
   Eigen::Matrix2d information_ = Eigen::Matrix2d::Zero();  // 1 / seconds squared

@@ -27,7 +27,7 @@ ReadoutCalibration CalibrateReadout(const ReadoutEstimationOptions& options,
   if (!estimate) return {};
   // Rows are exposed one after another, or columns.
   const Eigen::Vector2d sigmas = estimate->readout_s.cwiseAbs().cwiseQuotient(estimate->sigma_s);
-  const int axis = sigmas.x() > sigmas.y() ? 0 : 1;
+  const Eigen::Index axis = ReadoutAxis(*image).value_or(sigmas.x() > sigmas.y() ? 0 : 1);
   const double value = estimate->readout_s[axis], sigma = estimate->sigma_s[axis];
   const double smallest = std::max(options.min_readout_s, options.min_sigmas * sigma);
   if ((*before)[axis] == 0 && std::abs(value) < smallest) return {};

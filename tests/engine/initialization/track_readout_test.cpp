@@ -25,15 +25,27 @@ std::optional<TrackReadout> EstimateScene(const RolledScene& scene) {
   return EstimateTrackReadout({}, *Camera(), ShowCorners(scene));
 }
 
+// A camera with these sides in pixels and the focal length of Camera().
+CameraModel CameraWithSides(int width_px, int height_px) {
+  CameraModel::Intrinsics intrinsics = Camera()->intrinsics();
+  intrinsics.width_px = width_px;
+  intrinsics.height_px = height_px;
+  intrinsics.cx = width_px / 2.0 - 0.5;
+  intrinsics.cy = height_px / 2.0 - 0.5;
+  return CameraModel(Camera()->lens(), intrinsics, Camera()->distortion());
+}
+
 TEST(TrackReadout, IsThatOfTheShutterWhileAHandSways) {
   for (const Eigen::Vector2d& readout_s :
        {Eigen::Vector2d(0, 0.02), {0, -0.03}, {0.015, 0}, {-0.025, 0}, {0, 0}}) {
+    const bool upright = readout_s.x() != 0;
     for (std::uint64_t seed = 1; seed <= 4; ++seed) {
       RolledScene scene;
       scene.motion = Swaying(seed);
       scene.seed = seed;
       scene.readout_s = readout_s;
-      const auto estimate = EstimateScene(scene);
+      scene.camera = upright ? CameraWithSides(240, 320) : *Camera();
+      const auto estimate = EstimateTrackReadout({}, scene.camera, ShowCorners(scene));
       ASSERT_TRUE(estimate);
       EXPECT_LT(InMilliseconds((estimate->readout_s - readout_s).norm()), 3)
           << estimate->readout_s.transpose() << " instead of " << readout_s.transpose();
@@ -41,6 +53,25 @@ TEST(TrackReadout, IsThatOfTheShutterWhileAHandSways) {
       EXPECT_LT(estimate->noise_px, 0.1);
     }
   }
+}
+
+TEST(TrackReadout, TriesRowsAndColumnsInASquareImage) {
+  for (const Eigen::Vector2d& readout_s : {Eigen::Vector2d(0, 0.02), {-0.02, 0}}) {
+    RolledScene scene;
+    scene.camera = CameraWithSides(280, 280);
+    scene.readout_s = readout_s;
+    const auto estimate = EstimateTrackReadout({}, scene.camera, ShowCorners(scene));
+    ASSERT_TRUE(estimate);
+    EXPECT_LT(InMilliseconds((estimate->readout_s - readout_s).norm()), 3)
+        << estimate->readout_s.transpose() << " instead of " << readout_s.transpose();
+  }
+}
+
+TEST(TrackReadout, FindsNoColumnsInAnImageThatIsWiderThanHigh) {
+  RolledScene scene;
+  scene.readout_s = {0.03, 0};  // which no camera has
+  const auto estimate = EstimateScene(scene);
+  EXPECT_TRUE(!estimate || estimate->readout_s.x() == 0);
 }
 
 TEST(TrackReadout, ReturnsTheRotationRateOfEachImage) {

@@ -17,9 +17,14 @@ namespace {
 constexpr double kFrame_s = 1.0 / 30;
 constexpr double kNoise_px = 0.5;
 
-const std::shared_ptr<const CameraModel> kCamera = std::make_shared<CameraModel>(
-    LensModel::kRadialTangential, CameraModel::Intrinsics{640, 480, 520, 520, 319.5, 239.5},
-    std::array<double, 5>{});
+std::shared_ptr<const CameraModel> CameraOf(int width_px, int height_px) {
+  return std::make_shared<CameraModel>(
+      LensModel::kRadialTangential,
+      CameraModel::Intrinsics{width_px, height_px, 520, 520, width_px / 2.0 - 0.5, height_px / 2.0 - 0.5},
+      std::array<double, 5>{});
+}
+const std::shared_ptr<const CameraModel> kCamera = CameraOf(640, 480);
+const std::shared_ptr<const CameraModel> kUprightCamera = CameraOf(480, 640);
 
 double Normal(Random* random) {
   return std::sqrt(-2 * std::log(1 - random->Uniform())) * std::cos(2 * std::numbers::pi * random->Uniform());
@@ -33,20 +38,20 @@ Eigen::Vector3d RateAt(int frame) {
 // Shows `estimator` frames of a camera that really has `readout_s`: random points, their pixels with noise,
 // and the pose that fits them best with the model that the estimator has so far.
 void ShowFrames(const Eigen::Vector2d& readout_s, int frames, double outliers, std::uint64_t seed,
-                ReadoutEstimator* estimator) {
+                ReadoutEstimator* estimator, const std::shared_ptr<const CameraModel>& camera = kCamera) {
   Random random(seed);
   PoseRefinementMemory memory;
   for (int frame = 0; frame < frames; ++frame) {
     const ReadoutMotion truth{RateAt(frame), readout_s};
-    const CameraModel real = CameraModel::WithReadout(kCamera, truth);
+    const CameraModel real = CameraModel::WithReadout(camera, truth);
     const CameraModel assumed =
-        CameraModel::WithReadout(kCamera, {truth.rotation_rate, estimator->readout_s()});
+        CameraModel::WithReadout(camera, {truth.rotation_rate, estimator->readout_s()});
     std::vector<PoseMeasurement> measurements;
     while (measurements.size() < 300) {
       const double depth = random.Uniform(2, 6);
       const Eigen::Vector3d x(random.Uniform(-0.6, 0.6) * depth, random.Uniform(-0.45, 0.45) * depth, depth);
       auto pixel = real.Project(x);
-      if (!pixel || !kCamera->IsInside(*pixel)) continue;
+      if (!pixel || !camera->IsInside(*pixel)) continue;
       *pixel += kNoise_px * Eigen::Vector2d(Normal(&random), Normal(&random));
       if (random.Uniform(0, 1) < outliers)
         *pixel += Eigen::Vector2d(random.Uniform(-9, 9), random.Uniform(-9, 9));
@@ -68,11 +73,11 @@ TEST(ReadoutEstimator, FindsTheReadoutTimeOfTheRows) {
   }
 }
 
-TEST(ReadoutEstimator, FindsAReadoutAlongTheColumnsAndAgainstThem) {
+TEST(ReadoutEstimator, FindsAReadoutOfACameraThatIsHeldUprightOrUpsideDown) {
   for (const Eigen::Vector2d& readout_s :
        {Eigen::Vector2d(0.025, 0), Eigen::Vector2d(-0.025, 0), Eigen::Vector2d(0, -0.025)}) {
     ReadoutEstimator estimator({});
-    ShowFrames(readout_s, 60, 0, 2, &estimator);
+    ShowFrames(readout_s, 60, 0, 2, &estimator, readout_s.x() != 0 ? kUprightCamera : kCamera);
     EXPECT_LT((estimator.readout_s() - readout_s).norm(), 0.0015) << readout_s.transpose();
   }
 }
