@@ -155,6 +155,7 @@ class ReadoutProblem {
 std::optional<std::string> ReadoutEstimationOptions::Validate() const {
   return OptionCheck()
       .Positive(prior_sigma_s, "sigma of an unknown readout time")
+      .AtLeast(common_sigma_s, 0, "common error of a readout time")
       .AtLeast(min_sigmas, 0, "significance of a readout time")
       .AtLeast(min_readout_s, 0, "smallest readout time")
       .AtLeast(min_change_s, 0, "change of a readout time")
@@ -186,15 +187,16 @@ std::optional<ReadoutEstimate> EstimateReadout(const ReadoutEstimationOptions& o
   const double prior_sigma_s = known ? known->sigma_s : options.prior_sigma_s,
                prior = 1 / (prior_sigma_s * prior_sigma_s);
   const double variance = (known ? kReadoutRateErrors * kReadoutRateErrors : 1) * sigma * sigma;
-  Eigen::Vector2d weighted = (information * before - gradient) / variance;
-  if (known) weighted += prior * known->readout_s;
-  information /= variance;
+  const double common_variance = known ? options.common_sigma_s * options.common_sigma_s : 0;
+  const Eigen::Vector2d measured = (information * before - gradient) / variance;
   ReadoutEstimate estimate;
   // Rows are exposed one after another, or columns: each axis is estimated as if the other one were zero.
   for (int axis = 0; axis < 2; ++axis) {
-    const double total = information(axis, axis) + prior;
-    estimate.readout_s[axis] =
-        std::clamp(weighted[axis] / total, -options.max_readout_s, options.max_readout_s);
+    const double independent = information(axis, axis) / variance;
+    const double weight = 1 / (1 + independent * common_variance);
+    const double total = weight * independent + prior;
+    const double weighted = weight * measured[axis] + (known ? prior * known->readout_s[axis] : 0);
+    estimate.readout_s[axis] = std::clamp(weighted / total, -options.max_readout_s, options.max_readout_s);
     estimate.sigma_s[axis] = 1 / std::sqrt(total);
   }
   return estimate;

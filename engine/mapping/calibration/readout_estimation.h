@@ -23,6 +23,9 @@ struct ReadoutEstimationOptions {
   // From other measurements, such as those of the initialization or of earlier windows; instead of zero with
   // prior_sigma_s. Then the measurements count kReadoutRateErrors squared times less.
   std::optional<ReadoutPrior> prior = std::nullopt;
+  // Standard deviation of the errors that all images of one problem have in common, besides those. In a fast
+  // pan the newest keyframes told 17, 16, 14 and 12 ms instead of 18.5.
+  double common_sigma_s = 0.004;
   // A readout time is used once it differs from zero by this many standard deviations and seconds. Errors of
   // a calibration looked like up to 3.5 ms in real recordings; this is twice that. A faster shutter counts as
   // global.

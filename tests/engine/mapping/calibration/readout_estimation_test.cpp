@@ -165,13 +165,16 @@ TEST(ReadoutEstimation, WeighsTheMapAgainstWhatIsKnownAlready) {
   EXPECT_LT(certain->sigma_s.y(), 1.1e-5);
   const auto without = EstimateReadout({}, All(problem), problem);
   ASSERT_TRUE(without);
-  EXPECT_NEAR(vague->sigma_s.y(), kReadoutRateErrors * without->sigma_s.y(), 0.02 * vague->sigma_s.y());
+  const double expected_s =
+      std::hypot(kReadoutRateErrors * without->sigma_s.y(), ReadoutEstimationOptions().common_sigma_s);
+  EXPECT_NEAR(vague->sigma_s.y(), expected_s, 0.02 * expected_s);
 }
 
 TEST(ReadoutEstimation, RefusesOptionsThatMakeNoSense) {
   EXPECT_FALSE(ReadoutEstimationOptions().Validate());
   EXPECT_TRUE((ReadoutEstimationOptions{.prior_sigma_s = 0}).Validate());
   EXPECT_TRUE((ReadoutEstimationOptions{.max_readout_s = -1}).Validate());
+  EXPECT_TRUE((ReadoutEstimationOptions{.common_sigma_s = -1}).Validate());
   EXPECT_TRUE((ReadoutEstimationOptions{.min_sigmas = -1}).Validate());
   EXPECT_TRUE((ReadoutEstimationOptions{.min_measurements = 0}).Validate());
 }
@@ -241,6 +244,21 @@ TEST(ReadoutCalibration, ReturnsAnEstimateThatIsThePriorOfTheNext) {
   EXPECT_NEAR(ReadoutOfNewest(other).y(), 0.02, 0.003);
   Map global = MapOf(Scene(6, {0, 0}, {0, 0}, 7));
   EXPECT_FALSE(CalibrateReadout({}, {}, newest(global), &global).estimate);
+}
+
+TEST(ReadoutCalibration, CorrectsAPriorThatWasWrong) {
+  // The corners of an initialization were wrong by three standard deviations.
+  ReadoutEstimationOptions options;
+  options.prior = ReadoutPrior{{0, 0.008}, 0.004};
+  Map map = MapOf(Scene(6, {0, 0.02}, {0, 0}, 6));
+  const KeyFrameId newest = map.keyframes().rbegin()->first;
+  for (int round = 0; round < 10; ++round) {
+    options.prior = CalibrateReadout(options, {}, newest, &map).estimate;
+    ASSERT_TRUE(options.prior);
+    AdjustLocally({}, newest, nullptr, &map);
+  }
+  EXPECT_NEAR(options.prior->readout_s.y(), 0.02, 2 * options.prior->sigma_s);
+  EXPECT_LT(options.prior->sigma_s, 0.002);
 }
 
 TEST(ReadoutCalibration, KeepsWhatTheCalibrationStates) {
