@@ -34,15 +34,16 @@ double ContradictedRatio(std::span<const MapTracker::Attempt> attempts) {
     ++cells[attempt.cell].searched;
     if (attempt.inlier) ++cells[attempt.cell].inliers;
   }
-  // At an inlier ratio of 0.4, at most one inlier of ten has a probability of 0.05.
-  constexpr int kMinSearched = 8;
+  // At an inlier ratio of 0.4, none of five, and at most one inlier of ten, have probabilities of 0.08 and
+  // 0.05.
+  constexpr int kMinSearched = 5;
   constexpr double kMaxRatio = 0.1;
-  constexpr int kMinJudged = 60;  // fewer points lie in too few cells
+  constexpr int kMinJudged = 8;  // cells: a sixth of the image
   int judged = 0, contradicted = 0;
   for (const Count& cell : cells) {
     if (cell.searched < kMinSearched) continue;
-    judged += cell.searched;
-    if (cell.inliers <= kMaxRatio * cell.searched) contradicted += cell.searched;
+    ++judged;
+    if (cell.inliers <= kMaxRatio * cell.searched) ++contradicted;
   }
   return judged >= kMinJudged ? static_cast<double>(contradicted) / judged : 0;
 }

@@ -61,9 +61,9 @@ struct MapTrackResult {
   double sigma = 0;  // robust, of the normalized residuals
   // Cells of a 4x4 image grid with an inlier; measures how well the inliers are spread.
   int occupied_cells = 0;
-  // Of the points that were searched: the ratio of those in parts of the image where hardly any was an
-  // inlier. Occlusion causes this too; where it is large, the place may be another one with some of the same
-  // objects.
+  // Of the cells of an 8x6 image grid in which points were searched: the ratio of those where hardly any was
+  // an inlier. Occlusion causes this too; where it is large, the place may be another one with some of the
+  // same objects. Cells count alike, because an object with many points would outweigh all others.
   double contradicted_ratio = 0;
   bool converged = false;
   double median_depth = 0;  // map units, of the finite inliers

@@ -87,16 +87,22 @@ TEST_F(TrackingInAMap, FindsThePoseFromAPerturbedPrediction) {
   }
 }
 
-// Another room appears in the right part of the image.
-TEST_F(TrackingInAMap, ReportsTheRatioOfPointsInPartsThatShowSomethingElse) {
+// The room, but another one from `shown` of the width on.
+cv::Mat RoomBesideAnother(const RenderedWorld& room, const CameraModel& camera, const Rigid3& view,
+                          double shown) {
   const RenderedWorld other = RenderedWorld::Room(22);
+  cv::Mat image = room.Render(camera, view, 1.5, 3);
+  const int first = static_cast<int>(shown * image.cols);
+  const cv::Rect rest(first, 0, image.cols - first, image.rows);
+  if (rest.width > 0) other.Render(camera, view, 1.5, 3)(rest).copyTo(image(rest));
+  return image;
+}
+
+TEST_F(TrackingInAMap, ReportsTheRatioOfTheImageThatShowsSomethingElse) {
   const Rigid3 view = ViewsOfTheRoom()[0];
   double last = -1;
   for (const double shown : {1.0, 0.75, 0.5}) {
-    cv::Mat image = world_->Render(*camera_, view, 1.5, 3);
-    const cv::Rect rest(static_cast<int>(shown * image.cols), 0,
-                        image.cols - static_cast<int>(shown * image.cols), image.rows);
-    if (rest.width > 0) other.Render(*camera_, view, 1.5, 3)(rest).copyTo(image(rest));
+    const cv::Mat image = RoomBesideAnother(*world_, *camera_, view, shown);
     MapTracker tracker({}, camera_);
     Random random(4);
     const MapTrackResult result =
@@ -105,6 +111,22 @@ TEST_F(TrackingInAMap, ReportsTheRatioOfPointsInPartsThatShowSomethingElse) {
     EXPECT_GT(result.contradicted_ratio, last);
     last = result.contradicted_ratio;
   }
+}
+
+TEST_F(TrackingInAMap, DoesNotLetAnObjectOfManyPointsOutweighTheRestOfTheImage) {
+  const Rigid3 view = ViewsOfTheRoom()[0];
+  MapSnapshot dense_on_the_left = *map_;
+  std::erase_if(dense_on_the_left.points, [&](const MapPoint& point) {
+    const auto pixel = camera_->Project(view * point.position());
+    return pixel && pixel->x() > 0.5 * camera_->width_px() && point.id % 2 != 0;
+  });
+  MapTracker tracker({}, camera_);
+  Random random(4);
+  const MapTrackResult result =
+      tracker.Track(dense_on_the_left, *MakeFeatures(RoomBesideAnother(*world_, *camera_, view, 0.5)), view,
+                    Effort::kStandard, &random);
+  EXPECT_GT(result.Quality(), 0.55) << "more points are on the left";
+  EXPECT_NEAR(result.contradicted_ratio, 0.5, 0.1);
 }
 
 TEST_F(TrackingInAMap, ReportsAttemptsMatchesAndCovariance) {
