@@ -38,14 +38,19 @@ double ContradictedRatio(std::span<const MapTracker::Attempt> attempts) {
   // 0.05.
   constexpr int kMinSearched = 5;
   constexpr double kMaxRatio = 0.1;
-  constexpr int kMinJudged = 8;  // cells: a sixth of the image
-  int judged = 0, contradicted = 0;
+  constexpr int kMinPoints = 60;  // fewer points lie in too few cells
+  int points = 0, contradicted_points = 0, judged = 0, contradicted = 0;
   for (const Count& cell : cells) {
     if (cell.searched < kMinSearched) continue;
+    points += cell.searched;
     ++judged;
-    if (cell.inliers <= kMaxRatio * cell.searched) ++contradicted;
+    if (cell.inliers > kMaxRatio * cell.searched) continue;
+    contradicted_points += cell.searched;
+    ++contradicted;
   }
-  return judged >= kMinJudged ? static_cast<double>(contradicted) / judged : 0;
+  if (points < kMinPoints) return 0;
+  return std::max(static_cast<double>(contradicted_points) / points,
+                  static_cast<double>(contradicted) / judged);
 }
 
 }  // namespace

@@ -62,8 +62,9 @@ struct MapTrackResult {
   // Cells of a 4x4 image grid with an inlier; measures how well the inliers are spread.
   int occupied_cells = 0;
   // Of the cells of an 8x6 image grid in which points were searched: the ratio of those where hardly any was
-  // an inlier. Occlusion causes this too; where it is large, the place may be another one with some of the
-  // same objects. Cells count alike, because an object with many points would outweigh all others.
+  // an inlier, or the ratio of the points in them if that is larger. Occlusion causes this too; where it is
+  // large, the place may be another one with some of the same objects. The points alone do not tell, because
+  // an object with many of them would outweigh all others.
   double contradicted_ratio = 0;
   bool converged = false;
   double median_depth = 0;  // map units, of the finite inliers

@@ -123,6 +123,12 @@ TEST(PoseCriteria, SayWhyAPoseAfterALossIsRejected) {
   pose.contradicted_ratio = 0.6;
   EXPECT_EQ(criteria.RejectionReasonOf(pose, map, kStandard), RejectionReason::kContradicted);
   EXPECT_TRUE(criteria.IsAccepted(pose, kStandard)) << "a track goes on when the camera is partly hidden";
+  pose.contradicted_ratio = 0.5;
+  EXPECT_EQ(criteria.RejectionReasonOf(pose, map, kStandard), RejectionReason::kContradicted);
+  TrackerOptions tour;
+  tour.build_maps = false;
+  EXPECT_EQ(PoseCriteria(tour).RejectionReasonOf(pose, map, kStandard), RejectionReason::kNone)
+      << "people may hide so much from a visitor";
   pose = SoundPose();
   pose.attempted = 1000;  // a ratio of 0.2
   EXPECT_EQ(criteria.RejectionReasonOf(pose, map, kStandard), RejectionReason::kFewPoints);
