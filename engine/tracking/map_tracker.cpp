@@ -24,8 +24,8 @@ constexpr int kProjectedCellPx = 16;
 constexpr std::size_t kMissesSlots = 16384;
 constexpr std::uint8_t kMaxMisses = 4;  // consecutive misses are counted up to this value
 
-// See MapTrackResult::contradicted_ratio.
-double ContradictedRatio(std::span<const MapTracker::Attempt> attempts) {
+// See MapTrackResult::contradicted_ratio and contradicted_area.
+void SetContradictedRatios(std::span<const MapTracker::Attempt> attempts, MapTrackResult* result) {
   struct Count {
     int searched = 0, inliers = 0;
   };
@@ -36,21 +36,24 @@ double ContradictedRatio(std::span<const MapTracker::Attempt> attempts) {
   }
   // At an inlier ratio of 0.4, none of five, and at most one inlier of ten, have probabilities of 0.08 and
   // 0.05.
-  constexpr int kMinSearched = 5;
+  constexpr int kMinSearchedOfArea = 5, kMinSearched = 8;
   constexpr double kMaxRatio = 0.1;
   constexpr int kMinPoints = 60;  // fewer points lie in too few cells
-  int points = 0, contradicted_points = 0, judged = 0, contradicted = 0;
+  int points = 0, contradicted_points = 0, area = 0, contradicted_area = 0;
   for (const Count& cell : cells) {
-    if (cell.searched < kMinSearched) continue;
-    points += cell.searched;
-    ++judged;
-    if (cell.inliers > kMaxRatio * cell.searched) continue;
-    contradicted_points += cell.searched;
-    ++contradicted;
+    const bool contradicts = cell.inliers <= kMaxRatio * cell.searched;
+    if (cell.searched >= kMinSearchedOfArea) {
+      ++area;
+      if (contradicts) ++contradicted_area;
+    }
+    if (cell.searched >= kMinSearched) {
+      points += cell.searched;
+      if (contradicts) contradicted_points += cell.searched;
+    }
   }
-  if (points < kMinPoints) return 0;
-  return std::max(static_cast<double>(contradicted_points) / points,
-                  static_cast<double>(contradicted) / judged);
+  const bool judged = points >= kMinPoints;
+  result->contradicted_ratio = judged ? static_cast<double>(contradicted_points) / points : 0;
+  result->contradicted_area = judged ? static_cast<double>(contradicted_area) / area : 0;
 }
 
 }  // namespace
@@ -338,7 +341,7 @@ void MapTracker::CountInliers(MapTrackResult* result) {
     ++finite[cell];
     depths_.push_back((result->camera_from_map * measurement.point_in_map).z());
   }
-  result->contradicted_ratio = ContradictedRatio(attempts_);
+  SetContradictedRatios(attempts_, result);
   std::sort(last_inliers_.begin(), last_inliers_.end());
   result->occupied_cells = static_cast<int>(cells.count());
   const auto share = [&](const auto& counts) {

@@ -61,11 +61,13 @@ struct MapTrackResult {
   double sigma = 0;  // robust, of the normalized residuals
   // Cells of a 4x4 image grid with an inlier; measures how well the inliers are spread.
   int occupied_cells = 0;
-  // Of the cells of an 8x6 image grid in which points were searched: the ratio of those where hardly any was
-  // an inlier, or the ratio of the points in them if that is larger. Occlusion causes this too; where it is
-  // large, the place may be another one with some of the same objects. The points alone do not tell, because
-  // an object with many of them would outweigh all others.
+  // Of the points that were searched: the ratio of those in parts of the image where hardly any was an
+  // inlier. Occlusion causes this too; where it is large, the place may be another one with some of the same
+  // objects.
   double contradicted_ratio = 0;
+  // The same ratio of the parts themselves, cells of an 8x6 image grid. An object with many points does not
+  // outweigh all others here.
+  double contradicted_area = 0;
   bool converged = false;
   double median_depth = 0;  // map units, of the finite inliers
   // Inlier ratio: inliers / attempted (ptamm §2.1).

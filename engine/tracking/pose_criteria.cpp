@@ -67,9 +67,9 @@ RejectionReason PoseCriteria::RejectionReasonOf(const MapTrackResult& result, co
   if (!result.converged || result.sigma > options_.max_sigma || !FitsRotation(result, map))
     return RejectionReason::kPoorFit;
   if (result.occupied_cells < options_.min_recovery_cells) return RejectionReason::kClustered;
-  const double max_contradicted =
-      options_.build_maps ? options_.max_contradicted_ratio : options_.max_contradicted_ratio_of_visitor;
-  if (result.contradicted_ratio > max_contradicted) return RejectionReason::kContradicted;
+  if (result.contradicted_ratio > options_.max_contradicted_ratio ||
+      (options_.build_maps && result.contradicted_area > options_.max_contradicted_area))
+    return RejectionReason::kContradicted;
   return RejectionReason::kNone;
 }
 

@@ -37,7 +37,7 @@ std::optional<std::string> TrackerOptions::Validate() const {
       .AtLeast(confirming_frames, 1, "number of confirming frames")
       .Ratio(poor_visible_ratio, "visible inlier ratio of a poor pose")
       .Ratio(max_contradicted_ratio, "contradicted ratio of a pose after a loss")
-      .Ratio(max_contradicted_ratio_of_visitor, "contradicted ratio of a visitor's pose after a loss")
+      .Ratio(max_contradicted_area, "contradicted area of a pose after a loss")
       .AtLeast(better_ratio, 1, "ratio of a better map")
       .AtLeast(frames_between_better_map_searches, 1, "number of frames between searches")
       .AtLeast(min_standard_ratio, 0, "ratio of inliers of the standard comparison")

@@ -107,9 +107,9 @@ TEST_F(TrackingInAMap, ReportsTheRatioOfTheImageThatShowsSomethingElse) {
     Random random(4);
     const MapTrackResult result =
         tracker.Track(*map_, *MakeFeatures(image), view, Effort::kStandard, &random);
-    EXPECT_NEAR(result.contradicted_ratio, 1 - shown, 0.12);
-    EXPECT_GT(result.contradicted_ratio, last);
-    last = result.contradicted_ratio;
+    EXPECT_NEAR(result.contradicted_area, 1 - shown, 0.12);
+    EXPECT_GT(result.contradicted_area, last);
+    last = result.contradicted_area;
   }
 }
 
@@ -126,7 +126,7 @@ TEST_F(TrackingInAMap, DoesNotLetAnObjectOfManyPointsOutweighTheRestOfTheImage) 
       tracker.Track(dense_on_the_left, *MakeFeatures(RoomBesideAnother(*world_, *camera_, view, 0.5)), view,
                     Effort::kStandard, &random);
   EXPECT_GT(result.Quality(), 0.55) << "more points are on the left";
-  EXPECT_NEAR(result.contradicted_ratio, 0.5, 0.1);
+  EXPECT_NEAR(result.contradicted_area, 0.5, 0.1);
 }
 
 TEST_F(TrackingInAMap, ReportsAttemptsMatchesAndCovariance) {

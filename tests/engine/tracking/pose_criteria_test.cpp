@@ -123,7 +123,8 @@ TEST(PoseCriteria, SayWhyAPoseAfterALossIsRejected) {
   pose.contradicted_ratio = 0.6;
   EXPECT_EQ(criteria.RejectionReasonOf(pose, map, kStandard), RejectionReason::kContradicted);
   EXPECT_TRUE(criteria.IsAccepted(pose, kStandard)) << "a track goes on when the camera is partly hidden";
-  pose.contradicted_ratio = 0.5;
+  pose.contradicted_ratio = 0.4;
+  pose.contradicted_area = 0.5;
   EXPECT_EQ(criteria.RejectionReasonOf(pose, map, kStandard), RejectionReason::kContradicted);
   TrackerOptions tour;
   tour.build_maps = false;

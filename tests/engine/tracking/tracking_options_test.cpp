@@ -18,12 +18,11 @@ TEST(TrackerOptions, AreRefusedOutOfRange) {
       {[](auto* o) { o->good_quality = 1.5; }, [](auto* o) { o->lost_quality = 0.4; },
        [](auto* o) { o->max_sigma = kNaN; }, [](auto* o) { o->max_verified = 0; },
        [](auto* o) { o->confirming_frames = 0; }, [](auto* o) { o->better_ratio = 0.9; },
-       [](auto* o) { o->max_contradicted_ratio = 1.1; },
-       [](auto* o) { o->max_contradicted_ratio_of_visitor = -0.1; }, [](auto* o) { o->min_cells = 17; },
-       [](auto* o) { o->map_tracker.max_fine = 0; }, [](auto* o) { o->features.min_threshold = 0; },
-       [](auto* o) { o->initializer.attempt_interval = 0; }, [](auto* o) { o->target_start.min_matches = 0; },
-       [](auto* o) { o->map_tracker.nearby.frames = 0; }, [](auto* o) { o->keyframes.min_distance = -1; },
-       [](auto* o) { o->keyframe_policy.min_coverage = 2; },
+       [](auto* o) { o->max_contradicted_ratio = 1.1; }, [](auto* o) { o->max_contradicted_area = -0.1; },
+       [](auto* o) { o->min_cells = 17; }, [](auto* o) { o->map_tracker.max_fine = 0; },
+       [](auto* o) { o->features.min_threshold = 0; }, [](auto* o) { o->initializer.attempt_interval = 0; },
+       [](auto* o) { o->target_start.min_matches = 0; }, [](auto* o) { o->map_tracker.nearby.frames = 0; },
+       [](auto* o) { o->keyframes.min_distance = -1; }, [](auto* o) { o->keyframe_policy.min_coverage = 2; },
        [](auto* o) { o->rotation_center.min_poses = 0; }});
 }
 
