@@ -12,8 +12,8 @@
 #include "engine/base/time.h"
 #include "engine/geometry/camera_model.h"
 #include "engine/geometry/rigid3.h"
+#include "engine/initialization/corner_sequence.h"
 #include "engine/initialization/initial_pair.h"
-#include "engine/initialization/track_readout.h"
 #include "engine/vision/features.h"
 
 namespace docent::engine {

@@ -12,6 +12,7 @@
 #include "engine/initialization/corner_tracks.h"
 #include "engine/initialization/initial_pair.h"
 #include "engine/initialization/start_confirmation.h"
+#include "engine/initialization/track_readout.h"
 
 namespace docent::engine {
 

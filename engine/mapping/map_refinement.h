@@ -9,7 +9,7 @@
 #include <utility>
 #include <vector>
 
-#include "engine/initialization/track_readout.h"
+#include "engine/initialization/corner_sequence.h"
 #include "engine/mapping/map_workspace.h"
 #include "engine/mapping/mapper_options.h"
 #include "engine/mapping/mapper_output.h"

@@ -10,7 +10,7 @@
 #include <variant>
 #include <vector>
 
-#include "engine/initialization/track_readout.h"
+#include "engine/initialization/corner_sequence.h"
 #include "engine/mapping/keyframe_candidate.h"
 
 namespace docent::engine {
