@@ -24,6 +24,11 @@ Rigid3 MapHypothesis::Predict(const CameraImage& image) const {
   return Rigid3(rotation ? *rotation : Rotation3(), Eigen::Vector3d::Zero()) * camera_from_map_;
 }
 
+bool MapHypothesis::IsOfPlace(const CameraImage& image, std::uint64_t map_key,
+                              const MapTrackResult& result) const {
+  return map_key == map_key_ && AreOfOnePlace(Predict(image), result.camera_from_map, result.median_depth);
+}
+
 RelocalizationResult MapHypothesis::Unconfirmed(const MapTrackResult& result) const {
   return {.rejection = RejectionReason::kUnconfirmed,
           .map_key = map_key_,

@@ -26,6 +26,9 @@ class MapHypothesis {
   const Rigid3& camera_from_map() const { return camera_from_map_; }
   // The pose in the present image: the last one, rotated as the images are.
   Rigid3 Predict(const CameraImage& image) const;
+  // Whether a pose that was found in the present image is of the place of this hypothesis, so that the next
+  // frames confirm or contradict both.
+  bool IsOfPlace(const CameraImage& image, std::uint64_t map_key, const MapTrackResult& result) const;
   // Of a frame that the hypothesis explains, before it is confirmed.
   RelocalizationResult Unconfirmed(const MapTrackResult& result) const;
 

@@ -8,19 +8,13 @@
 
 namespace docent::engine {
 
-namespace {
-
-// Whether two poses in one map are different places and not two estimates of one. `keyframe` is close to one
-// of them.
-bool IsDifferentPlace(const KeyFrame& keyframe, const Rigid3& camera_from_map, const Rigid3& other_from_map) {
-  constexpr double kMinDistance = 0.25;  // ratio of the keyframe's median depth
-  constexpr double kMinAngle = 0.3;      // radians
+bool AreOfOnePlace(const Rigid3& camera_from_map, const Rigid3& other_from_map, double depth) {
+  constexpr double kMaxDistance = 0.25;  // ratio of the depth
+  constexpr double kMaxAngle = 0.3;      // radians
   const Rigid3 other_from_camera = other_from_map * camera_from_map.inverse();
-  return other_from_camera.translation.norm() > kMinDistance * keyframe.mean_depth ||
-         other_from_camera.rotation.Angle() > kMinAngle;
+  return other_from_camera.translation.norm() <= kMaxDistance * depth &&
+         other_from_camera.rotation.Angle() <= kMaxAngle;
 }
-
-}  // namespace
 
 PlaceVerification::PlaceVerification(const TrackerOptions& options, std::shared_ptr<const CameraModel> camera)
     : options_(options), criteria_(options), tracker_(options.map_tracker, std::move(camera)) {}
@@ -108,9 +102,8 @@ std::optional<VerifiedPlace> PlaceVerification::BestElsewhere(const Query& query
     query.rejection->Consider({.rejection = rejection, .map_key = map_key, .inliers = other.result.inliers});
     if (rejection != RejectionReason::kNone || (best && other.result.Quality() <= best->result.Quality()))
       continue;
-    if (IsDifferentPlace(*candidate.map->FindKeyFrame(candidate.keyframe), other.result.camera_from_map,
-                         camera_from_map))
-      best = other;
+    const double depth = candidate.map->FindKeyFrame(candidate.keyframe)->mean_depth;
+    if (!AreOfOnePlace(other.result.camera_from_map, camera_from_map, depth)) best = other;
   }
   return best;
 }

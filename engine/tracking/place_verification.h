@@ -12,6 +12,10 @@
 
 namespace docent::engine {
 
+// Whether two poses in one map are two estimates of one place and not different places. depth: median depth
+// of what the camera sees there.
+bool AreOfOnePlace(const Rigid3& camera_from_map, const Rigid3& other_from_map, double depth);
+
 // A place whose pose was verified in the image.
 struct VerifiedPlace {
   AlignedPlace place;

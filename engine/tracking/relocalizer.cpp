@@ -36,17 +36,6 @@ bool Relocalizer::HasBetterCompetitor(const PoseSearch& search, const MapTrackRe
              query, search.retrieval->ByThumbnail(search.image, *search.finder), {search.map_key}));
 }
 
-// Whether a pose in the present map is one that the hypothesis will confirm or refute.
-bool Relocalizer::IsNearHypothesis(const PoseSearch& search, const MapTrackResult& result) const {
-  constexpr double kMaxDistance = 0.25;  // ratio of the median depth
-  constexpr double kMaxAngle = 0.3;      // radians
-  if (search.hypothesis->map_key() != search.map_key) return false;
-  const Rigid3 hypothesis = search.hypothesis->Predict(search.image);
-  const double distance = (hypothesis.OriginInSource() - result.camera_from_map.OriginInSource()).norm(),
-               angle = (hypothesis.rotation * result.camera_from_map.rotation.inverse()).Angle();
-  return distance <= kMaxDistance * result.median_depth && angle <= kMaxAngle;
-}
-
 Relocalizer::Attempt Relocalizer::SearchNearby(const PoseSearch& search, TrackedFrame* out,
                                                std::optional<FoundPose>* found) {
   if (search.image.time - lost_since_ > FromSeconds(options_.short_loss_s)) return Attempt::kGoOn;
@@ -79,10 +68,12 @@ Relocalizer::Attempt Relocalizer::SearchNearby(const PoseSearch& search, Tracked
       }
       // A hypothesis elsewhere does not keep the author's camera from where it just was. A visitor's last
       // pose may come from visual odometry, which can follow people.
-      if (search.hypothesis->exists() && (!options_.build_maps || IsNearHypothesis(search, result)))
+      MapHypothesis& hypothesis = *search.hypothesis;
+      if (hypothesis.exists() &&
+          (!options_.build_maps || hypothesis.IsOfPlace(search.image, search.map_key, result)))
         return Attempt::kGoOn;
-      search.hypothesis->Begin(search.map_key, result.camera_from_map, search.pose->map_tracker().panorama());
-      out->relocalization = search.hypothesis->Unconfirmed(result);
+      hypothesis.Begin(search.map_key, result.camera_from_map, search.pose->map_tracker().panorama());
+      out->relocalization = hypothesis.Unconfirmed(result);
       return Attempt::kEnded;
     }
   }

@@ -38,7 +38,6 @@ class Relocalizer {
   // Continues a hypothesis by tracking it from its previous pose, which makes consecutive poses agree.
   Attempt ContinueHypothesis(const PoseSearch& search, TrackedFrame* out, std::optional<FoundPose>* found);
   std::optional<FoundPose> SearchPlaces(const PoseSearch& search, TrackedFrame* out);
-  bool IsNearHypothesis(const PoseSearch& search, const MapTrackResult& result) const;
   bool HasBetterCompetitor(const PoseSearch& search, const MapTrackResult& result, TrackedFrame* out) const;
   // Whether the best-to-second ratio is large enough in this frame, or the best map led in enough consecutive
   // frames. The key of the map that the camera was in is `own`.

@@ -178,6 +178,30 @@ TEST_F(TwoRooms, ForgetAHypothesisThatAFrameContradicts) {
   EXPECT_FALSE(hypothesis_.exists());
 }
 
+TEST_F(TwoRooms, LetTheAuthorReturnNearTheLastPoseInSpiteOfAHypothesisElsewhere) {
+  options_.poor_visible_ratio = 2;  // so that every pose needs confirmation
+  for (const bool build_maps : {true, false}) {
+    options_.build_maps = build_maps;
+    relocalizer_ = Relocalizer(options_);
+    pose_.Begin(Timestamp{}, Here(), ObservedMotion::kSixDof);
+    relocalizer_.Lose(Timestamp{});
+    maps_.Add(kOtherKey, TheMap());  // explains the image as well
+    hypothesis_.Begin(kOtherKey, Here(), kNoId);
+    EXPECT_FALSE(relocalizer_.Search(Search(ImageAt(Here(), 1), kKey), &out_));
+    if (!build_maps) {
+      EXPECT_FALSE(hypothesis_.exists());
+      EXPECT_EQ(out_.relocalization.rejection, RejectionReason::kAmbiguous);
+      continue;
+    }
+    EXPECT_EQ(hypothesis_.map_key(), kKey);
+    EXPECT_EQ(hypothesis_.frames(), 1);
+    maps_.Add(kOtherKey, MapOfOtherRoom());
+    EXPECT_FALSE(relocalizer_.Search(Search(ImageAt(Here(), 2), kKey), &out_));
+    EXPECT_EQ(hypothesis_.map_key(), kKey);
+    EXPECT_EQ(hypothesis_.frames(), 2) << "a hypothesis of this place goes on";
+  }
+}
+
 TEST_F(TwoRooms, AreReturnedToFromAMapThatWasStartedAfterALoss) {
   // The new map has another origin, so that a pose in the known map can be told from it.
   BetterMapSearch better(options_);
@@ -190,6 +214,27 @@ TEST_F(TwoRooms, AreReturnedToFromAMapThatWasStartedAfterALoss) {
   EXPECT_EQ(found->map_key, kKey);
   EXPECT_TRUE(IsHere(found->result.camera_from_map));
   EXPECT_GE(frames, 8) << "searches are rationed";
+}
+
+TEST(MapHypothesis, IsOfThePlaceOfPosesThatAreNear) {
+  MapHypothesis hypothesis;
+  hypothesis.Begin(kKey, Here(), kNoId);
+  const CameraImage image = ImageAt(Here());
+  const auto is_of_place = [&](std::uint64_t map_key, const Rigid3& camera_from_here) {
+    MapTrackResult result;
+    result.camera_from_map = camera_from_here * Here();
+    result.median_depth = 2;
+    return hypothesis.IsOfPlace(image, map_key, result);
+  };
+  const auto moved = [](double x) { return Rigid3(Rotation3(), {x, 0, 0}); };
+  const auto turned = [](double angle) {
+    return Rigid3(Rotation3::Exp({0, angle, 0}), Eigen::Vector3d::Zero());
+  };
+  EXPECT_TRUE(is_of_place(kKey, moved(0.49)));
+  EXPECT_FALSE(is_of_place(kKey, moved(0.51))) << "farther than a quarter of the depth";
+  EXPECT_TRUE(is_of_place(kKey, turned(0.29)));
+  EXPECT_FALSE(is_of_place(kKey, turned(0.31)));
+  EXPECT_FALSE(is_of_place(kOtherKey, moved(0)));
 }
 
 TEST(MapHypothesis, CountsConsecutiveFrames) {
