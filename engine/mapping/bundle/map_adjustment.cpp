@@ -1,6 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "engine/mapping/bundle/map_adjustment.h"
 
+#include <cmath>
+#include <optional>
+#include <utility>
+#include <vector>
+
+#include "engine/base/median.h"
 #include "engine/base/option_check.h"
 #include "engine/mapping/bundle/map_assembly.h"
 #include "engine/mapping/panorama/panorama_registration.h"
@@ -9,9 +15,67 @@ namespace docent::engine {
 
 namespace {
 
+// The centre that all fixed cameras share; empty if there are several, which determine the scale.
+std::optional<Eigen::Vector3d> OnlyFixedCenter(const BundleProblem& problem) {
+  std::optional<Eigen::Vector3d> only;
+  for (const BundleProblem::Camera& camera : problem.cameras) {
+    if (!camera.fixed) continue;
+    const Eigen::Vector3d center = camera.camera_from_map.OriginInSource();
+    if (only && *only != center) return std::nullopt;
+    only = center;
+  }
+  return only;
+}
+
+// The factor by which the adjusted distances from a centre are as before. With ten keyframes or more, those
+// of the keyframes tell it in the least-squares sense. Of fewer, the positions are poorly known: an
+// adjustment of two to four changed their distances by up to 18 %, and the median distance of the points by
+// 0.4 %.
+double ScaleThatKeepsDistances(const MapAssembly& assembly, const Eigen::Vector3d& center, Map* map) {
+  constexpr std::size_t kManyKeyframes = 10;
+  const BundleProblem& adjusted = assembly.problem;
+  if (adjusted.cameras.size() >= kManyKeyframes) {
+    double products = 0, squares = 0;
+    for (std::size_t i = 0; i < adjusted.cameras.size(); ++i) {
+      const Rigid3& before = map->FindKeyFrame(assembly.cameras[i])->keyframe.camera_from_map;
+      const Eigen::Vector3d after = adjusted.cameras[i].camera_from_map.OriginInSource() - center;
+      products += after.dot(before.OriginInSource() - center);
+      squares += after.squaredNorm();
+    }
+    return products / squares;
+  }
+  std::vector<double> ratios;
+  ratios.reserve(adjusted.points.size());
+  for (std::size_t i = 0; i < adjusted.points.size(); ++i) {
+    const Eigen::Vector3d before = map->FindPoint(assembly.points[i])->point.position();
+    const double ratio = (before - center).norm() / (adjusted.points[i].position - center).norm();
+    if (std::isfinite(ratio)) ratios.push_back(ratio);
+  }
+  return ratios.empty() ? 1 : Median(std::move(ratios));
+}
+
+// Images do not tell the scale: an adjustment from one fixed centre changes it by 0.1 to 3 %, and by up to 13
+// % when a map begins or two were joined. Scales the solution about this centre.
+void KeepScale(Map* map, MapAssembly* assembly) {
+  BundleProblem& problem = assembly->problem;
+  const auto center = OnlyFixedCenter(problem);
+  if (!center) return;
+  const double scale = ScaleThatKeepsDistances(*assembly, *center, map);
+  if (!(scale > 0) || !std::isfinite(scale)) return;
+  const auto scaled = [&](const Eigen::Vector3d& position) -> Eigen::Vector3d {
+    return *center + scale * (position - *center);
+  };
+  for (BundleProblem::Point& point : problem.points) point.position = scaled(point.position);
+  for (BundleProblem::Camera& camera : problem.cameras) {
+    Rigid3& pose = camera.camera_from_map;
+    if (!camera.fixed) pose.translation = -(pose.rotation * scaled(pose.OriginInSource()));
+  }
+}
+
 BundleSummary Solve(const BundleOptions& options, MapAssembly* assembly, Map* map) {
   const BundleSummary summary = AdjustBundle(options, &assembly->problem);
   if (summary.outcome == BundleSummary::Outcome::kFailed) return summary;
+  KeepScale(map, assembly);
   const PanoramaRegistration registration(*map);
   for (std::size_t i = 0; i < assembly->cameras.size(); ++i) {
     if (!assembly->problem.cameras[i].fixed) {
