@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "engine/tracking/map_hypothesis.h"
 
+#include <algorithm>
+
 namespace docent::engine {
 
 void MapHypothesis::Begin(std::uint64_t map_key, const Rigid3& camera_from_map, PanoramaId panorama) {
@@ -17,6 +19,10 @@ void MapHypothesis::Begin(const VerifiedPlace& found) {
 void MapHypothesis::Confirm(const Rigid3& camera_from_map) {
   camera_from_map_ = camera_from_map;
   ++frames_;
+}
+
+void MapHypothesis::Resume(const MapHypothesis& previous, int max_frames) {
+  frames_ = std::min(frames_ + previous.frames_, max_frames);
 }
 
 Rigid3 MapHypothesis::Predict(const CameraImage& image) const {

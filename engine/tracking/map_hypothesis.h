@@ -17,6 +17,9 @@ class MapHypothesis {
   void Begin(const VerifiedPlace& found);
   // The present frame gave this pose.
   void Confirm(const Rigid3& camera_from_map);
+  // The place was found again in the present frame, by place recognition, and not from the pose of
+  // `previous`. The frames that agreed with that agree with this one too, but at most `max_frames` count.
+  void Resume(const MapHypothesis& previous, int max_frames);
   void Clear() { frames_ = 0; }
 
   bool exists() const { return frames_ > 0; }

@@ -67,10 +67,12 @@ RejectionReason PoseCriteria::RejectionReasonOf(const MapTrackResult& result, co
   if (!result.converged || result.sigma > options_.max_sigma || !FitsRotation(result, map))
     return RejectionReason::kPoorFit;
   if (result.occupied_cells < options_.min_recovery_cells) return RejectionReason::kClustered;
-  if (result.contradicted_ratio > options_.max_contradicted_ratio ||
-      (options_.build_maps && result.contradicted_area > options_.max_contradicted_area))
-    return RejectionReason::kContradicted;
-  return RejectionReason::kNone;
+  return IsContradicted(result) ? RejectionReason::kContradicted : RejectionReason::kNone;
+}
+
+bool PoseCriteria::IsContradicted(const MapTrackResult& result) const {
+  return result.contradicted_ratio > options_.max_contradicted_ratio ||
+         (options_.build_maps && result.contradicted_area > options_.max_contradicted_area);
 }
 
 }  // namespace docent::engine

@@ -24,6 +24,8 @@ class PoseCriteria {
   bool IsGood(const MapTrackResult& result) const;
   // Whether a pose that is a pure rotation fits the measurements; true for all other poses.
   bool FitsRotation(const MapTrackResult& result, const MapSnapshot& map) const;
+  // Most of the image shows something else than the map.
+  bool IsContradicted(const MapTrackResult& result) const;
   // Why a pose that was found after a loss is rejected; kNone if it is accepted.
   RejectionReason RejectionReasonOf(const MapTrackResult& result, const MapSnapshot& map,
                                     PatchComparison comparison) const;

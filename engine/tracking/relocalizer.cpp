@@ -94,8 +94,8 @@ bool Relocalizer::IsUnambiguous(std::uint64_t best_key, double best_quality, std
   return ahead && (best_quality >= lead * second_quality || leader_.frames >= options_.min_leading_frames);
 }
 
-Relocalizer::Attempt Relocalizer::ContinueHypothesis(const PoseSearch& search, TrackedFrame* out,
-                                                     std::optional<FoundPose>* found) {
+Relocalizer::Attempt Relocalizer::ContinueHypothesis(const PoseSearch& search, MapHypothesis* missed,
+                                                     TrackedFrame* out, std::optional<FoundPose>* found) {
   MapHypothesis& hypothesis = *search.hypothesis;
   if (!hypothesis.exists()) return Attempt::kGoOn;
   MapTrackResult result;
@@ -114,6 +114,7 @@ Relocalizer::Attempt Relocalizer::ContinueHypothesis(const PoseSearch& search, T
   if (rejection != RejectionReason::kNone) {
     out->relocalization.Consider(
         {.rejection = rejection, .map_key = hypothesis.map_key(), .inliers = result.inliers});
+    if (map && !search.criteria.IsContradicted(result)) *missed = hypothesis;
     hypothesis.Clear();
     return Attempt::kGoOn;
   }
@@ -141,7 +142,8 @@ Relocalizer::Attempt Relocalizer::ContinueHypothesis(const PoseSearch& search, T
   return Attempt::kFound;
 }
 
-std::optional<FoundPose> Relocalizer::SearchPlaces(const PoseSearch& search, TrackedFrame* out) {
+std::optional<FoundPose> Relocalizer::SearchPlaces(const PoseSearch& search, const MapHypothesis& missed,
+                                                   TrackedFrame* out) {
   const auto query = search.Query(&out->relocalization);
   const auto go_on = [&](const std::vector<VerifiedPlace>& found) {
     return found.empty() && out->relocalization.rejection != RejectionReason::kAmbiguous;
@@ -161,8 +163,19 @@ std::optional<FoundPose> Relocalizer::SearchPlaces(const PoseSearch& search, Tra
     verify_too(search.retrieval->ByDescriptors(search.image, *search.finder, search.map_key, search.random));
   if (found.empty()) return std::nullopt;
   const auto key = [&](std::size_t i) { return found[i].place.candidate.map_key; };
+  MapHypothesis& hypothesis = *search.hypothesis;
+  // A camera that turns fast is far from its prediction, although the place is right. The last frame has to
+  // be found from the prediction, so that two poses in a row agree closely.
+  const auto begin = [&](const VerifiedPlace& place) {
+    hypothesis.Begin(place);
+    if (missed.exists() && missed.IsOfPlace(search.image, hypothesis.map_key(), place.result))
+      hypothesis.Resume(missed, options_.confirming_frames - 1);
+    out->relocalization = hypothesis.Unconfirmed(place.result);
+  };
   const auto return_to = [&](const VerifiedPlace& place) {
-    return ReturnToMap(search, place, options_.poor_visible_ratio, &out->relocalization);
+    const auto pose = ReturnToMap(search, place, options_.poor_visible_ratio, &out->relocalization);
+    if (hypothesis.exists()) begin(place);
+    return pose;
   };
   if (found.size() > 1 &&
       !IsUnambiguous(key(0), found[0].result.Quality(), key(1), found[1].result.Quality(), search.map_key)) {
@@ -178,8 +191,7 @@ std::optional<FoundPose> Relocalizer::SearchPlaces(const PoseSearch& search, Tra
     return std::nullopt;
   }
   if (key(0) == search.map_key) return return_to(found[0]);
-  search.hypothesis->Begin(found[0]);
-  out->relocalization = search.hypothesis->Unconfirmed(found[0].result);
+  begin(found[0]);
   return std::nullopt;
 }
 
@@ -192,12 +204,13 @@ std::optional<FoundPose> Relocalizer::Search(const PoseSearch& search, TrackedFr
   if (!search.hypothesis->exists() && frames_lost_++ > 0) search.pose->AlternateComparison();
   std::optional<FoundPose> found;
   if (search.map && SearchNearby(search, out, &found) != Attempt::kGoOn) return found;
-  if (!search.finder || ContinueHypothesis(search, out, &found) != Attempt::kGoOn) return found;
+  MapHypothesis missed;
+  if (!search.finder || ContinueHypothesis(search, &missed, out, &found) != Attempt::kGoOn) return found;
   // For a short time after the loss the same points are still occluded.
   if (options_.build_maps || !search.map ||
       search.image.time - lost_since_ > FromSeconds(options_.short_loss_s))
     search.pose->ForgetPatches();
-  return SearchPlaces(search, out);
+  return SearchPlaces(search, missed, out);
 }
 
 }  // namespace docent::engine

@@ -35,9 +35,13 @@ class Relocalizer {
  private:
   enum class Attempt { kFound, kGoOn, kEnded };  // kEnded: nothing more is tried in this frame
   Attempt SearchNearby(const PoseSearch& search, TrackedFrame* out, std::optional<FoundPose>* found);
-  // Continues a hypothesis by tracking it from its previous pose, which makes consecutive poses agree.
-  Attempt ContinueHypothesis(const PoseSearch& search, TrackedFrame* out, std::optional<FoundPose>* found);
-  std::optional<FoundPose> SearchPlaces(const PoseSearch& search, TrackedFrame* out);
+  // Continues a hypothesis by tracking it from its previous pose, which makes consecutive poses agree. It
+  // becomes *missed if that gives no pose, but the image does not contradict it either.
+  Attempt ContinueHypothesis(const PoseSearch& search, MapHypothesis* missed, TrackedFrame* out,
+                             std::optional<FoundPose>* found);
+  // missed: the hypothesis whose prediction gave no pose in this frame, if there is one.
+  std::optional<FoundPose> SearchPlaces(const PoseSearch& search, const MapHypothesis& missed,
+                                        TrackedFrame* out);
   bool HasBetterCompetitor(const PoseSearch& search, const MapTrackResult& result, TrackedFrame* out) const;
   // Whether the best-to-second ratio is large enough in this frame, or the best map led in enough consecutive
   // frames. The key of the map that the camera was in is `own`.

@@ -178,6 +178,35 @@ TEST_F(TwoRooms, ForgetAHypothesisThatAFrameContradicts) {
   EXPECT_FALSE(hypothesis_.exists());
 }
 
+TEST_F(TwoRooms, ConfirmAPlaceThatIsRecognizedAgainAwayFromItsPrediction) {
+  relocalizer_.LoseLongAgo();
+  const auto search = [&](int frame) {
+    return relocalizer_.Search(Search(ImageAt(Here(), frame), kOtherKey), &out_);
+  };
+  // Too far for a pose to be found from there.
+  const auto away = [](double metres) {
+    return Rigid3(Rotation3::Exp({0.1, 0.2, 0.1}), {metres, 0, 0}) * Here();
+  };
+  hypothesis_.Begin(kKey, away(0.5), kNoId);
+  EXPECT_FALSE(search(0));
+  EXPECT_EQ(hypothesis_.frames(), 2);
+  EXPECT_EQ(out_.relocalization.frames, 2);
+  EXPECT_TRUE(IsHere(hypothesis_.camera_from_map()));
+
+  hypothesis_.Begin(kKey, Here(), kNoId);
+  hypothesis_.Confirm(away(0.5));
+  EXPECT_FALSE(search(1));
+  EXPECT_EQ(hypothesis_.frames(), 2) << "the last frame must be found from the prediction";
+  const auto found = search(2);
+  ASSERT_TRUE(found);
+  EXPECT_TRUE(IsHere(found->result.camera_from_map));
+
+  hypothesis_.Begin(kKey, away(2), kNoId);
+  EXPECT_FALSE(search(3));
+  EXPECT_EQ(hypothesis_.frames(), 1) << "another place";
+  EXPECT_TRUE(IsHere(hypothesis_.camera_from_map()));
+}
+
 TEST_F(TwoRooms, LetTheAuthorReturnNearTheLastPoseInSpiteOfAHypothesisElsewhere) {
   options_.poor_visible_ratio = 2;  // so that every pose needs confirmation
   for (const bool build_maps : {true, false}) {
