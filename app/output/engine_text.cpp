@@ -2,6 +2,7 @@
 #include "app/output/engine_text.h"
 
 #include <algorithm>
+#include <cmath>
 #include <cstdarg>
 #include <cstdio>
 #include <numbers>
@@ -190,10 +191,12 @@ std::string TextOf(const engine::MapOverlap& overlap) {
 }
 
 std::string TextOf(const engine::CalibrationContradiction& contradiction) {
+  // Two digits: the estimate is known to a tenth at best.
+  const double unit = std::pow(10, std::floor(std::log10(contradiction.focal_px)) - 1);
   return Printed(
-      "The calibration is probably wrong: its focal length is %.0f px, but the map indicates about %.0f px "
-      "(+-%.0f %%). Calibrate the camera with `docent calibrate`.",
-      contradiction.given_focal_px, contradiction.focal_px, std::max(1.0, 100 * contradiction.focal_sigma));
+      "The calibration is probably wrong: its focal length is %.0f px, but the map indicates about %.0f px. "
+      "Calibrate the camera with `docent calibrate`.",
+      contradiction.given_focal_px, unit * std::round(contradiction.focal_px / unit));
 }
 
 std::string FormatFocalLength(const engine::EstimatedLens& lens) {

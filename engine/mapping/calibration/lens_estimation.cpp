@@ -374,7 +374,7 @@ std::optional<CalibrationContradiction> LensEstimation::Check(const std::atomic<
         estimate.sigma > options_.contradiction_residual * kept.sigma)
       continue;
     checked.done = true;
-    return CalibrationContradiction{focal, estimate.focal_px, sigma};
+    return CalibrationContradiction{focal, estimate.focal_px};
   }
   return std::nullopt;
 }

@@ -92,9 +92,9 @@ TEST(MapperEventText, GivesTheFiguresOfAnAdjustmentAndOfALoop) {
 }
 
 TEST(MapperEventText, WarnsAboutACalibrationInWholeSentences) {
-  EXPECT_EQ(InHall(MapperEvent::CalibrationContradicted{{620, 402.4, 0.002}}),
+  EXPECT_EQ(InHall(MapperEvent::CalibrationContradicted{{620, 402.4}}),
             "warning: The calibration is probably wrong: its focal length is 620 px, but the map indicates "
-            "about 402 px (+-1 %). Calibrate the camera with `docent calibrate`.");
+            "about 400 px. Calibrate the camera with `docent calibrate`.");
 }
 
 TEST(JoinRefusalText, SaysWhyTwoMapsWereNotJoined) {

@@ -210,8 +210,7 @@ TEST_F(LensEstimationTest, WarnsIfAGivenFocalLengthIsTooLongByHalf) {
   const auto contradiction = estimation.Check(nullptr, map);
   ASSERT_TRUE(contradiction);
   EXPECT_EQ(contradiction->given_focal_px, 620);
-  EXPECT_NEAR(contradiction->focal_px, scene.lens.intrinsics().fx,
-              4 * contradiction->focal_sigma * contradiction->focal_px);
+  EXPECT_NEAR(contradiction->focal_px, scene.lens.intrinsics().fx, 4);
   EXPECT_FALSE(estimation.Check(nullptr, map)) << "it is reported only once";
   EXPECT_EQ(map.keyframes().at(0).keyframe.camera, given);
 }
@@ -222,6 +221,30 @@ TEST_F(LensEstimationTest, DoesNotWarnAboutACorrectCalibration) {
   for (BundleProblem::Camera& camera : scene.problem.cameras) camera.model = given;
   LensEstimation estimation({});
   EXPECT_FALSE(estimation.Check(nullptr, MapOf(scene)));
+}
+
+TEST_F(LensEstimationTest, ChecksTheFocalLengthOfAFisheyeLens) {
+  const auto fisheye = [](double focal_px) {
+    return std::make_shared<const CameraModel>(
+        LensModel::kKannalaBrandt,
+        CameraModel::Intrinsics{640, 480, 0.97 * focal_px, 1.03 * focal_px, 325, 236},
+        std::array<double, 5>{0.01, -0.02, 0, 0, 0});
+  };
+  LensScene scene = MakeLensScene({.field_of_view_deg = 110, .noise_px = 0.4});
+  for (BundleProblem::Measurement& measurement : scene.problem.measurements) {
+    const Eigen::Vector3d ray = *scene.lens.Unproject(measurement.pixel.cast<double>());
+    measurement.pixel = fisheye(300)->Project(ray)->cast<float>();
+  }
+  for (const double focal_px : {300., 450.}) {
+    const auto given = fisheye(focal_px);
+    for (BundleProblem::Camera& camera : scene.problem.cameras) camera.model = given;
+    LensEstimation estimation({});
+    const auto contradiction = estimation.Check(nullptr, MapOf(scene));
+    EXPECT_EQ(contradiction.has_value(), focal_px == 450);
+    if (contradiction) {
+      EXPECT_NEAR(contradiction->focal_px, 300, 3);
+    }
+  }
 }
 
 }  // namespace
