@@ -166,15 +166,14 @@ std::optional<FoundPose> Relocalizer::SearchPlaces(const PoseSearch& search, con
   MapHypothesis& hypothesis = *search.hypothesis;
   // A camera that turns fast is far from its prediction, although the place is right. The last frame has to
   // be found from the prediction, so that two poses in a row agree closely.
-  const auto begin = [&](const VerifiedPlace& place) {
-    hypothesis.Begin(place);
+  const auto resume = [&](const VerifiedPlace& place) {
     if (missed.exists() && missed.IsOfPlace(search.image, hypothesis.map_key(), place.result))
       hypothesis.Resume(missed, options_.confirming_frames - 1);
     out->relocalization = hypothesis.Unconfirmed(place.result);
   };
   const auto return_to = [&](const VerifiedPlace& place) {
     const auto pose = ReturnToMap(search, place, options_.poor_visible_ratio, &out->relocalization);
-    if (hypothesis.exists()) begin(place);
+    if (hypothesis.exists()) resume(place);
     return pose;
   };
   if (found.size() > 1 &&
@@ -191,7 +190,8 @@ std::optional<FoundPose> Relocalizer::SearchPlaces(const PoseSearch& search, con
     return std::nullopt;
   }
   if (key(0) == search.map_key) return return_to(found[0]);
-  begin(found[0]);
+  hypothesis.Begin(found[0]);
+  resume(found[0]);
   return std::nullopt;
 }
 
