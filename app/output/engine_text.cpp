@@ -190,7 +190,7 @@ std::string TextOf(const engine::MapOverlap& overlap) {
 }
 
 std::string TextOf(const engine::CalibrationContradiction& contradiction) {
-  // Two digits: the estimate is known to a tenth at best.
+  // A map that was built with a wrong calibration does not know more digits.
   const double unit = std::pow(10, std::floor(std::log10(contradiction.focal_px)) - 1);
   return Printed(
       "The calibration is probably wrong: its focal length is %.0f px, but the map indicates about %.0f px. "

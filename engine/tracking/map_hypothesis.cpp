@@ -22,7 +22,7 @@ void MapHypothesis::Confirm(const Rigid3& camera_from_map) {
 }
 
 void MapHypothesis::Resume(const MapHypothesis& previous, int max_frames) {
-  frames_ = std::min(frames_ + previous.frames_, max_frames);
+  frames_ = std::max(frames_, std::min(frames_ + previous.frames_, max_frames));
 }
 
 Rigid3 MapHypothesis::Predict(const CameraImage& image) const {

@@ -266,6 +266,20 @@ TEST(MapHypothesis, IsOfThePlaceOfPosesThatAreNear) {
   EXPECT_FALSE(is_of_place(kOtherKey, moved(0)));
 }
 
+TEST(MapHypothesis, ResumesWithTheFramesOfThePreviousOne) {
+  MapHypothesis previous, hypothesis;
+  previous.Begin(kKey, Here(), kNoId);
+  previous.Confirm(Here());
+  hypothesis.Begin(kKey, Here(), kNoId);
+  hypothesis.Resume(previous, 0);
+  EXPECT_EQ(hypothesis.frames(), 1) << "the present frame counts in any case";
+  hypothesis.Resume(previous, 2);
+  EXPECT_EQ(hypothesis.frames(), 2);
+  hypothesis.Begin(kKey, Here(), kNoId);
+  hypothesis.Resume(previous, 5);
+  EXPECT_EQ(hypothesis.frames(), 3);
+}
+
 TEST(MapHypothesis, CountsConsecutiveFrames) {
   MapHypothesis hypothesis;
   EXPECT_FALSE(hypothesis.exists());
