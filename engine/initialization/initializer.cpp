@@ -68,6 +68,7 @@ void Initializer::SetCamera(std::shared_ptr<const CameraModel> camera) {
 
 void Initializer::Reset() {
   tracks_.Reset();
+  readout_from_corners_.reset();
   ResetAttempts();
   ended_ = following_ = false;
 }
@@ -114,6 +115,7 @@ std::optional<InitialPair> Initializer::Track(Timestamp time,
 }
 
 void Initializer::TrackCorners(Timestamp time, const std::shared_ptr<const ImageFeatures>& features) {
+  readout_from_corners_.reset();
   tracks_.Track(time, features, *camera_, AlignedRotation(*tracks_.newest(), *features, *camera_));
 }
 
@@ -209,9 +211,12 @@ double Initializer::DisplacementPx(const InitialPair::View& a, const InitialPair
   return 0.5 * rate * seconds / camera_->PixelAngle();
 }
 
-std::optional<TrackReadout> Initializer::ReadoutFromCorners() const {
+std::optional<TrackReadout> Initializer::ReadoutFromCorners() {
   if (!options_.estimate_readout || camera_->known_readout_s() || !tracks_.started()) return std::nullopt;
-  return EstimateTrackReadout(options_.track_readout, *camera_, tracks_.Sequence(tracks_.views().front()));
+  if (!readout_from_corners_)
+    readout_from_corners_ =
+        EstimateTrackReadout(options_.track_readout, *camera_, tracks_.Sequence(tracks_.views().front()));
+  return *readout_from_corners_;
 }
 
 bool Initializer::UseReadout(const TrackReadout& readout, MatchedViews* views) {

@@ -66,8 +66,9 @@ class Initializer {
                                       std::span<const std::uint32_t> ids, double speed_change_px,
                                       const ReadoutSource& readout);
   // What the corners tell that are tracked since the oldest first view. Empty if they do not tell it, or if
-  // the calibration of the camera states it.
-  std::optional<TrackReadout> ReadoutFromCorners() const;
+  // the calibration of the camera states it. Estimated once per image, although all pairs of views ask for
+  // it.
+  std::optional<TrackReadout> ReadoutFromCorners();
   // The search ended with this pair, or with one of other views of the camera. If it does not know the
   // readout time, the corners are tracked on through the next images, which may tell it.
   void EndWith(const InitialPair& pair);
@@ -123,6 +124,8 @@ class Initializer {
   std::vector<StartConfirmation> confirmations_;  // by slot of the first view
   StartConfirmation views_confirmation_;
   Eigen::Vector2d readout_s_ = Eigen::Vector2d::Zero();
+  // Of the newest image, once ReadoutFromCorners was called for it.
+  std::optional<std::optional<TrackReadout>> readout_from_corners_;
   Hint hint_ = Hint::kNone;
   double progress_ = 0, attempt_progress_ = 0;  // attempt_progress_: of the last attempt alone
   bool awaits_confirmation_ = false;
