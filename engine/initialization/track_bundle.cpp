@@ -25,7 +25,7 @@ constexpr double kInverseDistanceSigma = 2, kMinInverseDistance = 0.02, kMaxInve
 
 TrackBundle::TrackBundle(const TrackBundleOptions& options, const CameraModel& camera,
                          const CornerSequence& sequence)
-    : options_(&options), camera_(&camera), motions_(sequence.images.size()) {
+    : options_(&options), camera_(&camera) {
   state_.poses.resize(sequence.images.size());
   for (const CornerSequence::Image& image : sequence.images) {
     const std::size_t k = times_s_.size();
@@ -50,13 +50,13 @@ TrackBundle::TrackBundle(const TrackBundleOptions& options, const CameraModel& c
 }
 
 double TrackBundle::RobustSigma() const {
-  return std::max(options_->min_noise_px, sigma_px_);
+  return std::max(options_->min_noise_px, linearized_.sigma_px);
 }
 
 double TrackBundle::Cost(double sigma) const {
   double cost = 0;
-  for (const double norm : norms_) cost += Loss(norm / sigma);
-  cost += static_cast<double>(residuals_.size() - norms_.size()) * Loss(kHuberFactor);
+  for (const double norm : linearized_.norms) cost += Loss(norm / sigma);
+  cost += static_cast<double>(linearized_.residuals.size() - linearized_.norms.size()) * Loss(kHuberFactor);
   for (const double inverse : state_.inverse_distances)
     cost += (inverse - 1) * (inverse - 1) / (kInverseDistanceSigma * kInverseDistanceSigma);
   return cost + prior_.head<kLens>().dot(state_.lens.cwiseAbs2()) +
@@ -68,16 +68,18 @@ void TrackBundle::Adjust(std::optional<Eigen::Index> axis, int iterations) {
   Linearize();
   double damping = 1e-3;
   bool rejected = false;
+  State state;  // before the step
   for (int i = 0; i < iterations && damping < kMaxDamping; ++i) {
     const double sigma = RobustSigma(), before = Cost(sigma);
-    Reduce(sigma);
-    const State state = state_;
+    if (!rejected) Reduce(sigma);
+    state = state_;
     Step(axis, damping);
+    std::swap(linearized_, linearized_before_);
     Linearize();
     const double after = Cost(sigma);
     if (!(after < before)) {
-      state_ = state;
-      Linearize();
+      std::swap(state, state_);
+      std::swap(linearized_, linearized_before_);
       damping *= 10;
       rejected = true;
       continue;
@@ -91,11 +93,12 @@ std::vector<char> TrackBundle::Outliers() const {
   constexpr double kMaxSigmas = 3;  // of the root mean square over the images
   const std::size_t others = state_.poses.size() - 1;
   const double threshold = kMaxSigmas * RobustSigma();
+  const auto& [motions, residuals, visible, norms, sigma_px] = linearized_;
   std::vector<char> outliers;
-  for (std::size_t at = 0; at < residuals_.size(); at += others) {
+  for (std::size_t at = 0; at < residuals.size(); at += others) {
     double squares = 0;
     for (std::size_t k = at; k < at + others; ++k)
-      squares += visible_[k] ? residuals_[k].value.squaredNorm() : threshold * threshold;
+      squares += visible[k] ? residuals[k].value.squaredNorm() : threshold * threshold;
     outliers.push_back(squares > threshold * threshold * static_cast<double>(others));
   }
   return outliers;
@@ -123,7 +126,7 @@ double TrackBundle::ReadoutSigma(Eigen::Index axis) {
 
 std::vector<Eigen::Vector3d> TrackBundle::RotationRates() const {
   std::vector<Eigen::Vector3d> rates;
-  for (const Twist& motion : motions_)
+  for (const Twist& motion : linearized_.motions)
     rates.push_back(motion.tail<3>() + Eigen::Vector3d(-motion[1], motion[0], 0));
   return rates;
 }
@@ -158,14 +161,17 @@ void TrackBundle::UpdateMotions() {
     return (state_.poses[to] * state_.poses[from].inverse()).Log() / (times_s_[to] - times_s_[from]);
   };
   const std::size_t n = state_.poses.size();
-  for (std::size_t k = 1; k + 1 < n; ++k) motions_[k] = mean(k - 1, k + 1);
-  motions_.front() = 1.5 * mean(0, 1) - 0.5 * mean(1, 2);
-  motions_.back() = 1.5 * mean(n - 2, n - 1) - 0.5 * mean(n - 3, n - 2);
+  std::vector<Twist>& motions = linearized_.motions;
+  motions.resize(n);
+  for (std::size_t k = 1; k + 1 < n; ++k) motions[k] = mean(k - 1, k + 1);
+  motions.front() = 1.5 * mean(0, 1) - 0.5 * mean(1, 2);
+  motions.back() = 1.5 * mean(n - 2, n - 1) - 0.5 * mean(n - 3, n - 2);
 }
 
 Eigen::Vector3d TrackBundle::Velocity(std::size_t k, const Eigen::Vector3d& point,
                                       double inverse_distance) const {
-  return motions_[k].tail<3>().cross(point) + inverse_distance * motions_[k].head<3>();
+  const Twist& motion = linearized_.motions[k];
+  return motion.tail<3>().cross(point) + inverse_distance * motion.head<3>();
 }
 
 double TrackBundle::Loss(double x) const {
@@ -177,25 +183,29 @@ double TrackBundle::LossWeight(double x) const {
   return cauchy_ ? 1 / (1 + std::pow(x / kCauchyFactor, 2)) : kHuberFactor / std::max(kHuberFactor, x);
 }
 
-bool TrackBundle::Linearize(std::size_t i, std::size_t k, Residual* out) const {
-  const Corner& corner = corners_[i];
-  const double inverse = state_.inverse_distances[i];
+TrackBundle::FirstImage TrackBundle::InFirstImage(const Corner& corner, double inverse_distance) const {
+  FirstImage first;
+  first.position = camera_->ReadoutPosition(corner.seen->pixels.front().cast<double>());
+  first.delay = state_.readout_s.dot(first.position);
+  first.ray = corner.ray;
+  first.ray.head<2>() -= corner.ray_by_lens * state_.lens;
+  first.velocity = Velocity(0, first.ray, inverse_distance);
+  first.middle = first.ray - first.delay * first.velocity;
+  return first;
+}
+
+bool TrackBundle::Linearize(const Corner& corner, double inverse_distance, const FirstImage& first,
+                            std::size_t k, Residual* out) const {
+  const Rigid3& pose = state_.poses[k];
+  const Twist& motion = linearized_.motions[k];
   const Eigen::Vector2d measured = corner.seen->pixels[k].cast<double>(),
-                        position = camera_->ReadoutPosition(measured),
-                        first_position = camera_->ReadoutPosition(corner.seen->pixels.front().cast<double>());
-  const Eigen::Matrix3d rotation = state_.poses[k].rotation.matrix();
-  // The corner at the time of the middle row of the first image, in its camera frame and in that of image
-  // k.
-  const double first_delay = state_.readout_s.dot(first_position);
+                        position = camera_->ReadoutPosition(measured);
+  const Eigen::Matrix3d rotation = pose.rotation.matrix();
   out->delay = state_.readout_s.dot(position);
-  Eigen::Vector3d ray = corner.ray;
-  ray.head<2>() -= corner.ray_by_lens * state_.lens;
-  const Eigen::Vector3d first_velocity = Velocity(0, ray, inverse),
-                        middle = ray - first_delay * first_velocity,
-                        point = rotation * middle + inverse * state_.poses[k].translation,
-                        velocity = Velocity(k, point, inverse);
+  const Eigen::Vector3d point = rotation * first.middle + inverse_distance * pose.translation,
+                        velocity = Velocity(k, point, inverse_distance);
   // At the exposure of the row, to second order in the rotation.
-  const Eigen::Vector3d rotated = motions_[k].tail<3>().cross(velocity),
+  const Eigen::Vector3d rotated = motion.tail<3>().cross(velocity),
                         exposed = point + out->delay * velocity + 0.5 * out->delay * out->delay * rotated;
   Eigen::Vector2d pixel;
   Eigen::Matrix<double, 2, 3> by_point;
@@ -207,32 +217,36 @@ bool TrackBundle::Linearize(std::size_t i, std::size_t k, Residual* out) const {
   pixel += by_lens * state_.lens;
   by_point *= scale;
   out->value = scale * (pixel - measured);
-  out->by_pose << inverse * by_point, -by_point * Hat(point);
+  out->by_pose << inverse_distance * by_point, -by_point * Hat(point);
   const Eigen::Matrix<double, 2, 3> by_middle = by_point * rotation;
-  out->by_first_motion << -first_delay * inverse * by_middle, first_delay * by_middle * Hat(ray);
-  out->by_inverse_distance = by_point * (state_.poses[k].translation + out->delay * motions_[k].head<3>()) -
-                             by_middle * (first_delay * motions_[0].head<3>());
+  out->by_first_motion << -first.delay * inverse_distance * by_middle,
+      first.delay * by_middle * Hat(first.ray);
+  out->by_inverse_distance = by_point * (pose.translation + out->delay * motion.head<3>()) -
+                             by_middle * (first.delay * linearized_.motions[0].head<3>());
   out->by_shared.leftCols<kLens>() = scale * by_lens - by_middle.leftCols<2>() * corner.ray_by_lens;
   out->by_shared.rightCols<2>() =
-      by_point * velocity * position.transpose() - by_middle * first_velocity * first_position.transpose();
+      by_point * velocity * position.transpose() - by_middle * first.velocity * first.position.transpose();
   return out->value.allFinite();
 }
 
 void TrackBundle::Linearize() {
   UpdateMotions();
   const std::size_t n = state_.poses.size();
-  residuals_.resize(corners_.size() * (n - 1));
-  visible_.assign(residuals_.size(), 0);
-  norms_.clear();
+  auto& [motions, residuals, visible, norms, sigma_px] = linearized_;
+  residuals.resize(corners_.size() * (n - 1));
+  visible.assign(residuals.size(), 0);
+  norms.clear();
   for (std::size_t i = 0; i < corners_.size(); ++i) {
+    const double inverse_distance = state_.inverse_distances[i];
+    const FirstImage first = InFirstImage(corners_[i], inverse_distance);
     for (std::size_t k = 1; k < n; ++k) {
       const std::size_t at = i * (n - 1) + k - 1;
-      visible_[at] = Linearize(i, k, &residuals_[at]) ? 1 : 0;
-      if (visible_[at]) norms_.push_back(residuals_[at].value.norm());
+      visible[at] = Linearize(corners_[i], inverse_distance, first, k, &residuals[at]) ? 1 : 0;
+      if (visible[at]) norms.push_back(residuals[at].value.norm());
     }
   }
   // The median of a squared norm with two degrees of freedom is 2 ln 2 variances.
-  sigma_px_ = Median(norms_) / std::sqrt(2 * std::log(2.0));
+  sigma_px = Median(norms) / std::sqrt(2 * std::log(2.0));
 }
 
 void TrackBundle::CollectBlocks(std::size_t k, const Residual& residual) {
@@ -266,8 +280,8 @@ void TrackBundle::Reduce(double sigma) {
     gradients_[i] = hessians_[i] * (state_.inverse_distances[i] - 1);
     for (std::size_t k = 1; k < n; ++k) {
       const std::size_t at = i * (n - 1) + k - 1;
-      if (!visible_[at]) continue;
-      const Residual& r = residuals_[at];
+      if (!linearized_.visible[at]) continue;
+      const Residual& r = linearized_.residuals[at];
       const double weight = LossWeight(r.value.norm() / sigma) / (sigma * sigma);
       CollectBlocks(k, r);
       for (const PoseBlock& block : blocks_) {
@@ -292,10 +306,10 @@ void TrackBundle::Reduce(double sigma) {
     }
     gradient_ -= gradients_[i] / hessians_[i] * couplings_.col(column);
   }
-  Eigen::MatrixXd scaled = couplings_;
+  scaled_couplings_ = couplings_;
   for (std::size_t i = 0; i < corners_.size(); ++i)
-    scaled.col(static_cast<Eigen::Index>(i)) /= std::sqrt(hessians_[i]);
-  matrix_.selfadjointView<Eigen::Lower>().rankUpdate(scaled, -1);
+    scaled_couplings_.col(static_cast<Eigen::Index>(i)) /= std::sqrt(hessians_[i]);
+  matrix_.selfadjointView<Eigen::Lower>().rankUpdate(scaled_couplings_, -1);
   Eigen::Matrix<double, kShared, 1> present;
   present << state_.lens, state_.readout_s;
   matrix_.diagonal().tail<kShared>() += prior_;
@@ -304,17 +318,18 @@ void TrackBundle::Reduce(double sigma) {
 
 void TrackBundle::Step(std::optional<Eigen::Index> axis, double damping) {
   const Eigen::Index poses = matrix_.rows() - 2;
-  Eigen::MatrixXd matrix = matrix_;
+  damped_ = matrix_;
   Eigen::VectorXd gradient = gradient_;
-  matrix.diagonal() *= 1 + damping;
+  damped_.diagonal() *= 1 + damping;
   for (Eigen::Index a = 0; a < 2; ++a) {
     if (axis == a) continue;
-    matrix.row(poses + a).setZero();
-    matrix.col(poses + a).setZero();
-    matrix(poses + a, poses + a) = 1;
+    damped_.row(poses + a).setZero();
+    damped_.col(poses + a).setZero();
+    damped_(poses + a, poses + a) = 1;
     gradient[poses + a] = 0;
   }
-  const Eigen::VectorXd step = -matrix.llt().solve(gradient);
+  const Eigen::LLT<Eigen::Ref<Eigen::MatrixXd>, Eigen::Lower> factored(damped_);  // in place
+  const Eigen::VectorXd step = -factored.solve(gradient);
   if (!step.allFinite()) return;
   for (std::size_t k = 1; k < state_.poses.size(); ++k) {
     const auto at = static_cast<Eigen::Index>(6 * (k - 1));

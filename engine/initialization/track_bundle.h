@@ -36,7 +36,7 @@ class TrackBundle {
 
   std::size_t corners() const { return corners_.size(); }
   // Robust standard deviation of the residuals, in pixels of the level of each corner, and with its minimum.
-  double sigma_px() const { return sigma_px_; }
+  double sigma_px() const { return linearized_.sigma_px; }
   double RobustSigma() const;
   const Eigen::Vector2d& readout_s() const { return state_.readout_s; }
   // Of all residuals and priors, with this standard deviation of a pixel.
@@ -84,6 +84,21 @@ class TrackBundle {
     ByShared by_shared;
     double delay = 0;  // of the exposure in image k, seconds
   };
+  // A corner in the first image, in its camera frame at the exposure of the middle row.
+  struct FirstImage {
+    Eigen::Vector2d position;  // as CameraModel::ReadoutPosition
+    double delay;              // of the exposure of the corner, seconds
+    Eigen::Vector3d ray, velocity;
+    Eigen::Vector3d middle;  // the corner at the time of the middle row
+  };
+  // What follows from a state.
+  struct Linearization {
+    std::vector<Twist> motions;       // by image, left twist per second
+    std::vector<Residual> residuals;  // by corner, and by image without the first
+    std::vector<char> visible;        // by residual
+    std::vector<double> norms;        // of the residuals that are visible
+    double sigma_px = 0;
+  };
   // A twist per second as a weighted sum of the twists by which poses change.
   struct Weight {
     std::size_t image;
@@ -105,9 +120,11 @@ class TrackBundle {
   Eigen::Vector3d Velocity(std::size_t k, const Eigen::Vector3d& point, double inverse_distance) const;
   double Loss(double x) const;
   double LossWeight(double x) const;
-  // Of corner i in image k; points are scaled by the inverse distance of their corner. False if the corner is
+  FirstImage InFirstImage(const Corner& corner, double inverse_distance) const;
+  // Of a corner in image k; points are scaled by the inverse distance of their corner. False if the corner is
   // not in the image.
-  bool Linearize(std::size_t i, std::size_t k, Residual* out) const;
+  bool Linearize(const Corner& corner, double inverse_distance, const FirstImage& first, std::size_t k,
+                 Residual* out) const;
   // Of all residuals in the present state.
   void Linearize();
   // Collects the derivatives of a residual of image k by the poses of images, without the first.
@@ -122,22 +139,19 @@ class TrackBundle {
   const CameraModel* camera_;
   std::vector<double> times_s_;
   State state_;
-  std::vector<Twist> motions_;  // left twist per second
   std::vector<Corner> corners_;
-  bool cauchy_ = false;  // otherwise Huber's loss
-  double sigma_px_ = 0;
-  std::vector<double> norms_;                // of the residuals that are visible
+  bool cauchy_ = false;                      // otherwise Huber's loss
   std::vector<Weights> weights_;             // by image
   Eigen::Matrix<double, kShared, 1> prior_;  // inverse variances
   std::vector<PoseBlock> blocks_;            // scratch memory
-  // Of the last Linearize.
-  std::vector<Residual> residuals_;  // by corner, and by image without the first
-  std::vector<char> visible_;
+  Linearization linearized_;                 // the present state
+  Linearization linearized_before_;          // the state before the last step; scratch memory
   // Of the last Reduce.
   Eigen::MatrixXd matrix_;  // lower triangle
   Eigen::VectorXd gradient_;
   Eigen::MatrixXd couplings_;  // of each inverse distance, a column
   std::vector<double> hessians_, gradients_;
+  Eigen::MatrixXd scaled_couplings_, damped_;  // scratch memory
 };
 
 }  // namespace docent::engine
