@@ -183,8 +183,9 @@ double TrackBundle::LossWeight(double x) const {
   return cauchy_ ? 1 / (1 + std::pow(x / kCauchyFactor, 2)) : kHuberFactor / std::max(kHuberFactor, x);
 }
 
-TrackBundle::FirstImage TrackBundle::InFirstImage(const Corner& corner, double inverse_distance) const {
-  FirstImage first;
+TrackBundle::CornerInFirstImage TrackBundle::InFirstImage(const Corner& corner,
+                                                          double inverse_distance) const {
+  CornerInFirstImage first;
   first.position = camera_->ReadoutPosition(corner.seen->pixels.front().cast<double>());
   first.delay = state_.readout_s.dot(first.position);
   first.ray = corner.ray;
@@ -194,7 +195,7 @@ TrackBundle::FirstImage TrackBundle::InFirstImage(const Corner& corner, double i
   return first;
 }
 
-bool TrackBundle::Linearize(const Corner& corner, double inverse_distance, const FirstImage& first,
+bool TrackBundle::Linearize(const Corner& corner, double inverse_distance, const CornerInFirstImage& first,
                             std::size_t k, Residual* out) const {
   const Rigid3& pose = state_.poses[k];
   const Twist& motion = linearized_.motions[k];
@@ -238,7 +239,7 @@ void TrackBundle::Linearize() {
   norms.clear();
   for (std::size_t i = 0; i < corners_.size(); ++i) {
     const double inverse_distance = state_.inverse_distances[i];
-    const FirstImage first = InFirstImage(corners_[i], inverse_distance);
+    const CornerInFirstImage first = InFirstImage(corners_[i], inverse_distance);
     for (std::size_t k = 1; k < n; ++k) {
       const std::size_t at = i * (n - 1) + k - 1;
       visible[at] = Linearize(corners_[i], inverse_distance, first, k, &residuals[at]) ? 1 : 0;

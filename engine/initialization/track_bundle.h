@@ -84,12 +84,13 @@ class TrackBundle {
     ByShared by_shared;
     double delay = 0;  // of the exposure in image k, seconds
   };
-  // A corner in the first image, in its camera frame at the exposure of the middle row.
-  struct FirstImage {
+  // A corner in the first image, in its camera frame and scaled by the inverse distance.
+  struct CornerInFirstImage {
     Eigen::Vector2d position;  // as CameraModel::ReadoutPosition
     double delay;              // of the exposure of the corner, seconds
-    Eigen::Vector3d ray, velocity;
-    Eigen::Vector3d middle;  // the corner at the time of the middle row
+    Eigen::Vector3d ray;       // with the errors of the calibration
+    Eigen::Vector3d velocity;  // per second
+    Eigen::Vector3d middle;    // where it is at the exposure of the middle row
   };
   // What follows from a state.
   struct Linearization {
@@ -120,11 +121,11 @@ class TrackBundle {
   Eigen::Vector3d Velocity(std::size_t k, const Eigen::Vector3d& point, double inverse_distance) const;
   double Loss(double x) const;
   double LossWeight(double x) const;
-  FirstImage InFirstImage(const Corner& corner, double inverse_distance) const;
+  CornerInFirstImage InFirstImage(const Corner& corner, double inverse_distance) const;
   // Of a corner in image k; points are scaled by the inverse distance of their corner. False if the corner is
   // not in the image.
-  bool Linearize(const Corner& corner, double inverse_distance, const FirstImage& first, std::size_t k,
-                 Residual* out) const;
+  bool Linearize(const Corner& corner, double inverse_distance, const CornerInFirstImage& first,
+                 std::size_t k, Residual* out) const;
   // Of all residuals in the present state.
   void Linearize();
   // Collects the derivatives of a residual of image k by the poses of images, without the first.
