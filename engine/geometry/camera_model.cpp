@@ -9,6 +9,7 @@
 #include <sstream>
 #include <vector>
 
+#include "engine/geometry/plain_vector3.h"
 #include "engine/geometry/polynomial.h"
 
 namespace docent::engine {
@@ -162,21 +163,14 @@ std::optional<Eigen::Vector2d> BrownUndistort(const std::array<double, 5>& k,
 }
 
 // A rotation by a rotation vector, to second order: of 0.05 radians, wrong by 0.00002.
-inline Eigen::Vector3d SmallRotation(const Eigen::Vector3d& rotation, const Eigen::Vector3d& point) {
-  const double a = rotation.x(), b = rotation.y(), c = rotation.z();
-  const double x = b * point.z() - c * point.y(), y = c * point.x() - a * point.z(),
-               z = a * point.y() - b * point.x();
-  return {point.x() + x + 0.5 * (b * z - c * y), point.y() + y + 0.5 * (c * x - a * z),
-          point.z() + z + 0.5 * (a * y - b * x)};
+inline PlainVector3 SmallRotation(const PlainVector3& rotation, const PlainVector3& point) {
+  const PlainVector3 first = Cross(rotation, point);
+  return point + first + Cross(rotation, first) * 0.5;
 }
 
-// jacobian times the matrix of the cross product with `angle`.
-inline Eigen::Matrix<double, 2, 3> TimesHat(const Eigen::Matrix<double, 2, 3>& jacobian,
-                                            const Eigen::Vector3d& angle) {
-  Eigen::Matrix<double, 2, 3> result;
-  // Each row r: r [angle]x = (r x angle).
-  for (int row = 0; row < 2; ++row) result.row(row) = jacobian.row(row).transpose().cross(angle).transpose();
-  return result;
+inline Eigen::Vector3d SmallRotation(const Eigen::Vector3d& rotation, const Eigen::Vector3d& point) {
+  const PlainVector3 result = SmallRotation(PlainVector3(rotation), PlainVector3(point));
+  return {result.x, result.y, result.z};
 }
 
 const char* Name(LensModel lens) {
@@ -216,6 +210,12 @@ std::optional<std::string> ComplainAboutDistortion(LensModel lens, const std::ar
 }
 
 }  // namespace
+
+// A pixel, and its derivatives with respect to the point in the camera frame.
+struct CameraModel::LensProjection {
+  double x, y;
+  PlainVector3 x_by_point, y_by_point;
+};
 
 CameraModel::CameraModel() : CameraModel(LensModel::kRadialTangential, {1, 1, 1, 1, 0, 0}, {}) {}
 
@@ -291,15 +291,16 @@ std::optional<std::string> CameraModel::Validate(LensModel lens, const Intrinsic
 
 // Projects through the plane z = 1, from which the Brown and FOV models map to the image with a symmetric
 // Jacobian.
-bool CameraModel::ProjectThroughPlane(const Eigen::Vector3d& point, bool with_jacobian,
-                                      ImagePoint* result) const {
-  const double z = point.z();
-  const double radius_squared = point.x() * point.x() + point.y() * point.y();
+[[gnu::always_inline]] inline bool CameraModel::ProjectThroughPlane(const PlainVector3& point,
+                                                                    bool with_jacobian,
+                                                                    ImagePoint* result) const {
+  const double z = point.z;
+  const double radius_squared = point.x * point.x + point.y * point.y;
   if (!(z > 0) || !(radius_squared <= max_radius_squared_ * z * z)) {
     return false;
   }
   const double inverse_z = 1 / z;
-  const double x = point.x() * inverse_z, y = point.y() * inverse_z;
+  const double x = point.x * inverse_z, y = point.y * inverse_z;
   if (lens_ == LensModel::kRadialTangential) {
     BrownDistort(distortion_, x, y, result);
   } else {
@@ -323,8 +324,8 @@ bool CameraModel::ProjectThroughPlane(const Eigen::Vector3d& point, bool with_ja
 }
 
 // Projects through the angle from the axis, with the Kannala-Brandt model, also beyond 90 degrees.
-bool CameraModel::ProjectByAngle(const Eigen::Vector3d& point, ImagePoint* result) const {
-  const double x = point.x(), y = point.y(), z = point.z();
+bool CameraModel::ProjectByAngle(const PlainVector3& point, ImagePoint* result) const {
+  const double x = point.x, y = point.y, z = point.z;
   const double radius_squared = x * x + y * y, radius = std::sqrt(radius_squared);
   const double angle = std::atan2(radius, z);
   if (!(angle <= max_angle_) || (radius == 0 && !(z > 0))) {
@@ -343,19 +344,29 @@ bool CameraModel::ProjectByAngle(const Eigen::Vector3d& point, ImagePoint* resul
   return true;
 }
 
+[[gnu::always_inline]] inline bool CameraModel::ProjectThroughLens(const PlainVector3& point,
+                                                                   bool with_jacobian,
+                                                                   LensProjection* result) const {
+  ImagePoint at;
+  if (!(lens_ == LensModel::kKannalaBrandt ? ProjectByAngle(point, &at)
+                                           : ProjectThroughPlane(point, with_jacobian, &at)))
+    return false;
+  const double fx = intrinsics_.fx, fy = intrinsics_.fy;
+  result->x = fx * at.x + intrinsics_.cx;
+  result->y = fy * at.y + intrinsics_.cy;
+  result->x_by_point = {fx * at.xx, fx * at.xy, fx * at.xz};
+  result->y_by_point = {fy * at.xy, fy * at.yy, fy * at.yz};
+  return true;
+}
+
 bool CameraModel::ProjectLens(const Eigen::Vector3d& point_in_camera, Eigen::Vector2d* pixel,
                               Eigen::Matrix<double, 2, 3>* jacobian) const {
-  ImagePoint point;
-  if (!(lens_ == LensModel::kKannalaBrandt
-            ? ProjectByAngle(point_in_camera, &point)
-            : ProjectThroughPlane(point_in_camera, jacobian != nullptr, &point))) {
-    return false;
-  }
-  const double fx = intrinsics_.fx, fy = intrinsics_.fy;
-  *pixel = {fx * point.x + intrinsics_.cx, fy * point.y + intrinsics_.cy};
-  if (jacobian != nullptr) {
-    *jacobian << fx * point.xx, fx * point.xy, fx * point.xz, fy * point.xy, fy * point.yy, fy * point.yz;
-  }
+  LensProjection lens;
+  if (!ProjectThroughLens(PlainVector3(point_in_camera), jacobian != nullptr, &lens)) return false;
+  *pixel = {lens.x, lens.y};
+  if (jacobian != nullptr)
+    *jacobian << lens.x_by_point.x, lens.x_by_point.y, lens.x_by_point.z, lens.y_by_point.x,
+        lens.y_by_point.y, lens.y_by_point.z;
   return true;
 }
 
@@ -386,15 +397,26 @@ std::shared_ptr<const CameraModel> CameraModel::WithMotionOf(const CameraModel& 
 
 Eigen::Vector3d CameraModel::AtExposureOf(const Eigen::Vector2d& pixel, const Eigen::Vector3d& point) const {
   if (!rotates_) return point;
-  return SmallRotation(readout_.rotation_rate * readout_.readout_s.dot(ReadoutPosition(pixel)), point);
+  return SmallRotation(readout_.rotation_rate * ExposureDelay(pixel.x(), pixel.y()), point);
+}
+
+double CameraModel::ExposureDelay(double x, double y) const {
+  return readout_.readout_s.x() * ((x + 0.5) / intrinsics_.width_px - 0.5) +
+         readout_.readout_s.y() * ((y + 0.5) / intrinsics_.height_px - 0.5);
 }
 
 bool CameraModel::ProjectAtExposureOf(const Eigen::Vector2d& measured, const Eigen::Vector3d& point_in_camera,
                                       Eigen::Vector2d* pixel, Eigen::Matrix<double, 2, 3>* jacobian) const {
   if (!rotates_) return ProjectLens(point_in_camera, pixel, jacobian);
-  const Eigen::Vector3d angle = readout_.rotation_rate * readout_.readout_s.dot(ReadoutPosition(measured));
-  if (!ProjectLens(SmallRotation(angle, point_in_camera), pixel, jacobian)) return false;
-  if (jacobian != nullptr) *jacobian += TimesHat(*jacobian, angle);
+  const PlainVector3 angle = PlainVector3(readout_.rotation_rate) * ExposureDelay(measured.x(), measured.y());
+  LensProjection lens;
+  if (!ProjectThroughLens(SmallRotation(angle, PlainVector3(point_in_camera)), jacobian != nullptr, &lens))
+    return false;
+  *pixel = {lens.x, lens.y};
+  if (jacobian == nullptr) return true;
+  const PlainVector3 x = lens.x_by_point + Cross(lens.x_by_point, angle),
+                     y = lens.y_by_point + Cross(lens.y_by_point, angle);
+  *jacobian << x.x, x.y, x.z, y.x, y.y, y.z;
   return true;
 }
 
@@ -405,21 +427,32 @@ bool CameraModel::Project(const Eigen::Vector3d& point_in_camera, Eigen::Vector2
   // the middle of the image, v the velocity at which the rotation moves it, and d the readout times. What
   // this neglects, the change of the velocity meanwhile, is of second order in the rotation during the
   // readout.
-  Eigen::Matrix<double, 2, 3> slope;
-  if (!ProjectLens(point_in_camera, pixel, &slope)) return false;
-  const Eigen::RowVector2d delay_by_pixel(readout_.readout_s.x() / intrinsics_.width_px,
-                                          readout_.readout_s.y() / intrinsics_.height_px);
-  const Eigen::Vector2d velocity = slope * readout_.rotation_rate.cross(point_in_camera);
+  const PlainVector3 rate(readout_.rotation_rate), point(point_in_camera);
+  LensProjection lens;
+  if (!ProjectThroughLens(point, true, &lens)) return false;
+  const double delay_by_x = readout_.readout_s.x() / intrinsics_.width_px;
+  const double delay_by_y = readout_.readout_s.y() / intrinsics_.height_px;
+  const PlainVector3 velocity = Cross(rate, point);
   const double delay =
-      readout_.readout_s.dot(ReadoutPosition(*pixel)) / (1 - static_cast<double>(delay_by_pixel * velocity));
-  const Eigen::Vector3d angle = readout_.rotation_rate * delay;
-  const Eigen::Vector3d rotated = SmallRotation(angle, point_in_camera);
-  if (!ProjectLens(rotated, pixel, jacobian)) return false;
+      ExposureDelay(lens.x, lens.y) /
+      (1 - (delay_by_x * Dot(lens.x_by_point, velocity) + delay_by_y * Dot(lens.y_by_point, velocity)));
+  const PlainVector3 angle = rate * delay;
+  const PlainVector3 rotated = SmallRotation(angle, point);
+  if (!ProjectThroughLens(rotated, jacobian != nullptr, &lens)) return false;
+  *pixel = {lens.x, lens.y};
   if (jacobian == nullptr) return true;
   // pixel = lens(Exp(rate delay(pixel)) point), differentiated on both sides.
-  const Eigen::Vector2d by_delay = *jacobian * readout_.rotation_rate.cross(rotated);
-  const Eigen::Matrix2d factor = (Eigen::Matrix2d::Identity() - by_delay * delay_by_pixel).inverse();
-  *jacobian = (factor * (*jacobian + TimesHat(*jacobian, angle))).eval();
+  const PlainVector3 turned = Cross(rate, rotated);
+  const double x_by_delay = Dot(lens.x_by_point, turned), y_by_delay = Dot(lens.y_by_point, turned);
+  const double xx = 1 - x_by_delay * delay_by_x, xy = 0 - x_by_delay * delay_by_y;
+  const double yx = 0 - y_by_delay * delay_by_x, yy = 1 - y_by_delay * delay_by_y;
+  const double inverse = 1 / (xx * yy - yx * xy);
+  const PlainVector3 x = lens.x_by_point + Cross(lens.x_by_point, angle),
+                     y = lens.y_by_point + Cross(lens.y_by_point, angle);
+  const double ixx = yy * inverse, ixy = -xy * inverse, iyx = -yx * inverse, iyy = xx * inverse;
+  *jacobian << MultiplyAdd(ixy, y.x, ixx * x.x), MultiplyAdd(ixy, y.y, ixx * x.y),
+      MultiplyAdd(ixy, y.z, ixx * x.z), MultiplyAdd(iyy, y.x, iyx * x.x), MultiplyAdd(iyy, y.y, iyx * x.y),
+      MultiplyAdd(iyy, y.z, iyx * x.z);
   return true;
 }
 
@@ -434,8 +467,7 @@ std::optional<Eigen::Vector2d> CameraModel::Project(const Eigen::Vector3d& point
 std::optional<Eigen::Vector3d> CameraModel::Unproject(const Eigen::Vector2d& pixel) const {
   std::optional<Eigen::Vector3d> ray = UnprojectLens(pixel);
   if (!rotates_ || !ray) return ray;
-  return SmallRotation(-readout_.rotation_rate * readout_.readout_s.dot(ReadoutPosition(pixel)), *ray)
-      .normalized();
+  return SmallRotation(-readout_.rotation_rate * ExposureDelay(pixel.x(), pixel.y()), *ray).normalized();
 }
 
 std::optional<Eigen::Vector3d> CameraModel::UnprojectLens(const Eigen::Vector2d& pixel) const {

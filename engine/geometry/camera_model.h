@@ -10,6 +10,8 @@
 
 namespace docent::engine {
 
+struct PlainVector3;
+
 // How a lens distorts, with the meaning of CameraModel::distortion.
 enum class LensModel {
   kRadialTangential,  // k1 k2 p1 p2 k3, Brown 1966 as OpenCV's pinhole model
@@ -132,8 +134,12 @@ class CameraModel {
   bool ProjectLens(const Eigen::Vector3d& point, Eigen::Vector2d* pixel,
                    Eigen::Matrix<double, 2, 3>* jacobian) const;
   std::optional<Eigen::Vector3d> UnprojectLens(const Eigen::Vector2d& pixel) const;
-  bool ProjectThroughPlane(const Eigen::Vector3d& point, bool with_jacobian, ImagePoint* result) const;
-  bool ProjectByAngle(const Eigen::Vector3d& point, ImagePoint* result) const;
+  struct LensProjection;
+  bool ProjectThroughLens(const PlainVector3& point, bool with_jacobian, LensProjection* result) const;
+  bool ProjectThroughPlane(const PlainVector3& point, bool with_jacobian, ImagePoint* result) const;
+  bool ProjectByAngle(const PlainVector3& point, ImagePoint* result) const;
+  // Time from the middle of the image to the exposure of a pixel, seconds.
+  double ExposureDelay(double x, double y) const;
 
   LensModel lens_ = LensModel::kRadialTangential;
   Intrinsics intrinsics_;
