@@ -3,10 +3,13 @@
 
 #include <Eigen/Cholesky>
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 
+#include "engine/base/multiply_add.h"
 #include "engine/base/option_check.h"
+#include "engine/vision/lanes.h"
 
 namespace docent::engine {
 
@@ -14,7 +17,6 @@ namespace {
 
 using Matrix6 = Eigen::Matrix<double, 6, 6>;
 using Vector6 = Eigen::Matrix<double, 6, 1>;
-using Matrix26 = Eigen::Matrix<double, 2, 6>;
 
 using Projection = PoseRefinementMemory::Projection;
 
@@ -33,20 +35,59 @@ Projection ProjectMeasurement(const CameraModel& camera, const Eigen::Matrix3d& 
   return projection;
 }
 
-// d normalized pixel / d twist. pivot: centre of the three rotational degrees of freedom, camera frame.
-Matrix26 PoseJacobian(const Projection& projection, const PoseMeasurement& measurement,
-                      const Eigen::Vector3d& pivot) {
-  const double w = measurement.point_in_map[3];
-  Matrix26 jacobian;
-  // The assumed distance of an infinite point must not constrain the translation.
-  if (measurement.infinite()) {
-    jacobian.leftCols<3>().setZero();
-  } else {
-    jacobian.leftCols<3>() = w * projection.jacobian;
+// Sums the normal equations of a pose. Columns of eight rows, of which the last two stay zero, fill vector
+// registers.
+class NormalEquations {
+ public:
+  // Adds a measurement. arm: from the centre of the three rotational degrees of freedom to the point, camera
+  // frame. translation: weight of the translational columns of the Jacobian.
+  void Add(const Projection& projection, const Eigen::Vector3d& arm, double translation, double weight) {
+    std::array<Row, 2> rows;  // of x and y
+    std::array<Column, 2> weighted;
+    for (int i = 0; i < 2; ++i) {
+      rows[i] = RowOf(projection, i, arm, translation);
+      const FourDoubles scale = AllDoubles(weight);
+      weighted[i] = {FourDoubles(rows[i][0], rows[i][1], rows[i][2], rows[i][3]) * scale,
+                     FourDoubles(rows[i][4], rows[i][5], 0, 0) * scale};
+    }
+    for (std::size_t k = 0; k < columns_.size(); ++k) {
+      const FourDoubles x = AllDoubles(rows[0][k]), y = AllDoubles(rows[1][k]);
+      columns_[k].top += MultiplyAdd(weighted[1].top, y, weighted[0].top * x);
+      columns_[k].bottom += MultiplyAdd(weighted[1].bottom, y, weighted[0].bottom * x);
+    }
   }
-  jacobian.rightCols<3>() = -projection.jacobian * Hat(projection.point_in_camera - w * pivot);
-  return jacobian;
-}
+
+  void Get(Matrix6* normal, Vector6* gradient) const {
+    Eigen::Matrix<double, 8, 7> all;
+    for (std::size_t k = 0; k < columns_.size(); ++k) {
+      double* column = all.col(static_cast<Eigen::Index>(k)).data();
+      Store(columns_[k].top, column);
+      Store(columns_[k].bottom, column + 4);
+    }
+    *normal = all.topLeftCorner<6, 6>();
+    *gradient = all.topRightCorner<6, 1>();
+  }
+
+ private:
+  using Row = std::array<double, 7>;  // d normalized pixel / d twist, and the error
+  struct Column {
+    FourDoubles top = AllDoubles(0), bottom = AllDoubles(0);
+  };
+
+  static Row RowOf(const Projection& projection, int axis, const Eigen::Vector3d& arm, double translation) {
+    const double x = projection.jacobian(axis, 0), y = projection.jacobian(axis, 1),
+                 z = projection.jacobian(axis, 2);
+    return {translation * x,
+            translation * y,
+            translation * z,
+            MultiplyAdd(z, arm.y(), -(y * arm.z())),
+            MultiplyAdd(-z, arm.x(), x * arm.z()),
+            MultiplyAdd(y, arm.x(), -(x * arm.y())),
+            projection.error[axis]};
+  }
+
+  std::array<Column, 7> columns_;  // six of the matrix, and the gradient
+};
 
 // With fewer rays the rotation is not reliable.
 constexpr std::ptrdiff_t kMinRays = 8;
@@ -177,8 +218,7 @@ void PoseDescent::Project(bool tukey) {
 }
 
 void PoseDescent::Accumulate(bool tukey) {
-  normal_.setZero();
-  gradient_.setZero();
+  NormalEquations equations;
   result_.inliers = result_.finite_inliers = 0;
   depth_ = 0;
   for (std::size_t i = 0; i < measurements_.size(); ++i) {
@@ -193,11 +233,12 @@ void PoseDescent::Accumulate(bool tukey) {
       result_.finite_inliers += !infinite;
       if (!infinite) depth_ += projection.point_in_camera.z();
     }
-    const double weight = measurement.weight * (infinite ? constraint_.infinite_weight : 1.0);
-    const Matrix26 jacobian = PoseJacobian(projection, measurement, pivot_);
-    normal_.noalias() += weight * jacobian.transpose() * jacobian;
-    gradient_.noalias() += weight * jacobian.transpose() * projection.error;
+    const double w = measurement.point_in_map[3];
+    // The assumed distance of an infinite point must not constrain the translation.
+    equations.Add(projection, projection.point_in_camera - w * pivot_, infinite ? 0 : w,
+                  measurement.weight * (infinite ? constraint_.infinite_weight : 1.0));
   }
+  equations.Get(&normal_, &gradient_);
 }
 
 void PoseDescent::AddConstraint() {

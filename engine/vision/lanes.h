@@ -6,10 +6,15 @@
 #include <cstdint>
 #include <opencv2/core/simd_intrinsics.hpp>
 
-// OpenCV's universal intrinsics at the widths used in this folder: bytes at the width of the target up to 32,
-// floats eight at a time, which is a row of a patch. Results are identical at every width.
-// opencv2/core/hal/intrin.hpp alone provides only four floats, whatever the compiler's target.
+#include "engine/base/multiply_add.h"
+
+// OpenCV's universal intrinsics at the widths used in the engine: bytes at the width of the target up to 32,
+// floats eight at a time, which is a row of a patch, doubles four at a time. Results are identical at every
+// width, except for the rounding of MultiplyAdd. opencv2/core/hal/intrin.hpp alone provides only four floats,
+// whatever the compiler's target.
 namespace docent::engine {
+
+using docent::MultiplyAdd;  // of single numbers; the overload below takes lanes
 
 #if CV_SIMD256
 
@@ -45,6 +50,17 @@ inline void StoreRounded(const EightFloats& lanes, int* to) {
 }
 inline void StoreTruncated(const EightFloats& lanes, int* to) {
   cv::v_store(to, cv::v_trunc(lanes));
+}
+
+using FourDoubles = cv::v_float64x4;
+inline FourDoubles AllDoubles(double value) {
+  return cv::v256_setall_f64(value);
+}
+inline void Store(const FourDoubles& lanes, double* to) {
+  cv::v_store(to, lanes);
+}
+inline FourDoubles MultiplyAdd(const FourDoubles& a, const FourDoubles& b, const FourDoubles& c) {
+  return cv::v_fma(a, b, c);
 }
 
 #else
@@ -99,6 +115,27 @@ inline void StoreRounded(const EightFloats& lanes, int* to) {
 inline void StoreTruncated(const EightFloats& lanes, int* to) {
   cv::v_store(to, cv::v_trunc(lanes.low));
   cv::v_store(to + 4, cv::v_trunc(lanes.high));
+}
+
+struct FourDoubles {
+  cv::v_float64x2 low, high;
+  FourDoubles() = default;
+  FourDoubles(cv::v_float64x2 first, cv::v_float64x2 last) : low(first), high(last) {}
+  FourDoubles(double a, double b, double c, double d) : low(a, b), high(c, d) {}
+  FourDoubles& operator+=(const FourDoubles& other) { return *this = {low + other.low, high + other.high}; }
+  friend FourDoubles operator*(const FourDoubles& a, const FourDoubles& b) {
+    return {a.low * b.low, a.high * b.high};
+  }
+};
+inline FourDoubles AllDoubles(double value) {
+  return {cv::v_setall_f64(value), cv::v_setall_f64(value)};
+}
+inline void Store(const FourDoubles& lanes, double* to) {
+  cv::v_store(to, lanes.low);
+  cv::v_store(to + 2, lanes.high);
+}
+inline FourDoubles MultiplyAdd(const FourDoubles& a, const FourDoubles& b, const FourDoubles& c) {
+  return {cv::v_fma(a.low, b.low, c.low), cv::v_fma(a.high, b.high, c.high)};
 }
 
 #endif

@@ -2,12 +2,16 @@
 #include <benchmark/benchmark.h>
 
 #include <algorithm>
+#include <array>
+#include <memory>
 #include <optional>
+#include <random>
 #include <utility>
 #include <vector>
 
 #include "engine/mapping/bundle/map_adjustment.h"
 #include "engine/matching/point_search.h"
+#include "engine/matching/pose_refinement.h"
 #include "engine/vision/fast_corners.h"
 #include "engine/vision/features.h"
 #include "engine/vision/lanes.h"
@@ -188,6 +192,39 @@ void AlignAPatch(benchmark::State& state) {
       benchmark::Counter(2 * (8 + 8 * 26 + 40 + 40), benchmark::Counter::kIsIterationInvariantRate);
 }
 BENCHMARK(AlignAPatch)->Unit(benchmark::kNanosecond);
+
+// The pose of an image from 500 points of which 50 are wrong. state.range(0): whether the camera turns while
+// a rolling shutter exposes the image.
+void RefineAPose(benchmark::State& state) {
+  const auto lens = std::make_shared<engine::CameraModel>(
+      engine::LensModel::kRadialTangential, engine::CameraModel::Intrinsics{640, 480, 520, 520, 320, 240},
+      std::array<double, 5>{0.1, -0.2, 0.001, -0.001, 0.05});
+  const Eigen::Vector3d rate(0.3, -0.5, 0.2);  // radians per second
+  const auto camera = engine::CameraModel::WithReadout(
+      lens, {state.range(0) != 0 ? rate : Eigen::Vector3d::Zero(), Eigen::Vector2d(0, 0.02)});
+  std::mt19937 random(1);
+  std::uniform_real_distribution<double> uniform(-1, 1);
+  std::vector<engine::PoseMeasurement> measurements;
+  while (measurements.size() < 500) {
+    const double depth = 2 + uniform(random);
+    const Eigen::Vector3d point(0.5 * depth * uniform(random), 0.4 * depth * uniform(random), depth);
+    const auto pixel = camera.Project(point);
+    if (!pixel) continue;
+    const double noise_px = measurements.size() % 10 == 0 ? 8 : 0.5;
+    engine::PoseMeasurement measurement;
+    measurement.point_in_map = point.homogeneous();
+    measurement.pixel = *pixel + noise_px * Eigen::Vector2d(uniform(random), uniform(random));
+    measurements.push_back(measurement);
+  }
+  Eigen::Matrix<double, 6, 1> twist;  // the error of a prediction
+  twist << 0.01, 0.02, -0.01, 0.004, -0.003, 0.002;
+  const engine::Rigid3 predicted = engine::Rigid3::Exp(twist);
+  engine::PoseRefinementMemory memory;
+  for (auto _ : state)
+    benchmark::DoNotOptimize(engine::RefinePose(camera, predicted, {}, &measurements, &memory,
+                                                {Eigen::Vector3d::Zero(), predicted}));
+}
+BENCHMARK(RefineAPose)->ArgName("rolling")->Arg(0)->Arg(1)->Unit(benchmark::kMicrosecond);
 
 void AdjustLocally(benchmark::State& state) {
   if (!HasMap(&state)) return;
