@@ -30,6 +30,15 @@ std::optional<Eigen::Vector2d> ReadoutIn(const Map& map, const CameraModel& came
   return newest->second.keyframe.camera->readout_motion().readout_s;
 }
 
+double LargestRotationRateIn(const MapSnapshot& map, const CameraModel& camera) {
+  double largest = 0;
+  for (const KeyFrame& keyframe : map.keyframes) {
+    if (IsRotatingImage(*keyframe.camera, camera))
+      largest = std::max(largest, keyframe.camera->readout_motion().rotation_rate.norm());
+  }
+  return largest;
+}
+
 std::shared_ptr<const CameraModel> WithReadoutIn(const Map& map,
                                                  const std::shared_ptr<const CameraModel>& camera) {
   const ReadoutMotion& motion = camera->readout_motion();

@@ -16,6 +16,10 @@ namespace docent::engine {
 std::optional<Eigen::Vector2d> ReadoutIn(const MapSnapshot& map, const CameraModel& camera);
 std::optional<Eigen::Vector2d> ReadoutIn(const Map& map, const CameraModel& camera);
 
+// The largest rotation rate of the images of the camera's lens in a map, radians per second; zero if none is
+// known.
+double LargestRotationRateIn(const MapSnapshot& map, const CameraModel& camera);
+
 // The model of an image with the readout time that its lens has in a map: `camera` itself if the map does not
 // tell, the rotation is not known, or the readout time of the camera is known (CameraModel::known_readout_s).
 std::shared_ptr<const CameraModel> WithReadoutIn(const Map& map,

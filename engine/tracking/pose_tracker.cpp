@@ -30,6 +30,7 @@ void PoseTracker::Reset() {
   rotation_center_.Reset();
   pivot_estimate_ = {};
   readout_map_ = nullptr;
+  largest_rate_in_map_ = 0;
   map_tracker_.Clear();
   map_tracker_.EnablePanorama(kNoId);
 }
@@ -38,6 +39,7 @@ void PoseTracker::Begin(Timestamp time, const Rigid3& camera_from_map, ObservedM
   map_tracker_.Clear();
   map_tracker_.EnablePanorama(kNoId);
   readout_map_ = nullptr;
+  largest_rate_in_map_ = 0;
   motion_.Reset(time, camera_from_map);
   position_.Reset();
   mean_twist_.reset();
@@ -64,6 +66,7 @@ void PoseTracker::ContinueFrom(const PoseTracker& other) {
   rotation_reference_ = other.rotation_reference_;
   rotation_reference_pose_ = other.rotation_reference_pose_;
   readout_s_ = other.readout_s_;
+  largest_rate_in_map_ = other.largest_rate_in_map_;
   readout_ = other.readout_;
   last_points_ = other.last_points_;
   drift_per_s_ = other.drift_per_s_;
@@ -177,9 +180,23 @@ void PoseTracker::UpdateReadout(const MapSnapshot& map) {
   readout_map_ = &map;
   readout_revision_ = map.revision;
   const auto& known_s = lens_->known_readout_s();
-  const auto readout_s = known_s ? known_s : ReadoutIn(map, *lens_);
-  readout_is_known_ = readout_s.has_value();
-  if (readout_s) readout_s_ = *readout_s;
+  const auto in_map_s = known_s ? known_s : ReadoutIn(map, *lens_);
+  readout_is_known_ = known_s || (in_map_s && !in_map_s->isZero(0));
+  if (readout_is_known_) readout_s_ = *in_map_s;
+  const double largest_rate = in_map_s && !readout_is_known_ ? LargestRotationRateIn(map, *lens_) : 0;
+  if (largest_rate > largest_rate_in_map_) {
+    // The mapper has found none with images that turn faster than those before.
+    readout_s_.setZero();
+    readout_ = ReadoutEstimator(options_.readout);
+  }
+  largest_rate_in_map_ = largest_rate;
+}
+
+bool PoseTracker::MayEstimateReadout() const {
+  // What an unknown readout time has bent in the map is at most a third of what it does to this image.
+  constexpr double kFasterThanMap = 3;
+  return !readout_is_known_ &&
+         image_camera_->readout_motion().rotation_rate.norm() > kFasterThanMap * largest_rate_in_map_;
 }
 
 void PoseTracker::SetTwist(const Eigen::Matrix<double, 6, 1>& twist) {
@@ -212,7 +229,7 @@ void PoseTracker::AccountForReadout(const CameraImage& image, const Rigid3& pred
   constexpr double kNegligible_px = 0.2;  // of the first and the last row
   if (change_px > kNegligible_px) map_tracker_.RefineAgain(predicted, result);
   mean_twist_ = mean_twist();
-  if (readout_is_known_) return;
+  if (!MayEstimateReadout()) return;
   readout_.Add(*image_camera_, result->camera_from_map, map_tracker_.measurements(), result->sigma, seconds);
   if (!readout_.readout_s().isZero(0)) readout_s_ = readout_.readout_s();
 }

@@ -100,6 +100,9 @@ class PoseTracker {
   void SetTwist(const Eigen::Matrix<double, 6, 1>& twist);
   // Takes the readout time from a snapshot that has not been asked yet, unless the calibration states it.
   void UpdateReadout(const MapSnapshot& map);
+  // Whether the residuals of the present image may tell the readout time: no map or calibration has told it,
+  // and the images of the map were not taken while turning as fast.
+  bool MayEstimateReadout() const;
   // Repeats the pose estimate with the motion that it implies, and lets it tell the readout time.
   void AccountForReadout(const CameraImage& image, const Rigid3& predicted, MapTrackResult* result);
   // The panorama map to search: the open one, or one to whose centre the camera has returned if the finite
@@ -139,10 +142,11 @@ class PoseTracker {
   // rotation, a later one.
   std::shared_ptr<const ImageFeatures> rotation_reference_;
   Rigid3 rotation_reference_pose_;
-  // The readout time of the calibration goes first, then that of a map that this camera builds; elsewhere it
-  // is estimated here.
+  // The readout time of the calibration goes first, then that of a map that this camera builds; elsewhere,
+  // and until that map tells it, it is estimated here.
   Eigen::Vector2d readout_s_ = Eigen::Vector2d::Zero();
-  bool readout_is_known_ = false;             // by the calibration or the map
+  bool readout_is_known_ = false;   // by the calibration or the map
+  double largest_rate_in_map_ = 0;  // while that is unknown: of this camera's images, radians per second
   const MapSnapshot* readout_map_ = nullptr;  // the snapshot that was asked last, never dereferenced
   std::uint64_t readout_revision_ = 0;
   ReadoutEstimator readout_;

@@ -46,6 +46,18 @@ TEST(MapReadout, GivesTheReadoutTimeToEarlierImagesOfTheSameCamera) {
   EXPECT_FALSE(SetReadout(*camera, {0, 0.02}, &map)) << "they have it already";
 }
 
+TEST(MapReadout, KnowsTheLargestRotationRateOfACamera) {
+  const auto camera = Camera(500), other = Camera(600);
+  Map map;
+  EXPECT_DOUBLE_EQ(LargestRotationRateIn(*map.Snapshot(), *camera), 0);
+  AddKeyFrame(camera, &map);
+  AddKeyFrame(Image(camera, 0.3, 0), &map);
+  AddKeyFrame(Image(camera, -0.7, 0), &map);
+  AddKeyFrame(Image(camera, 0.1, 0), &map);
+  AddKeyFrame(Image(other, 2, 0), &map);
+  EXPECT_DOUBLE_EQ(LargestRotationRateIn(*map.Snapshot(), *camera), 0.7);
+}
+
 TEST(MapReadout, TurnsInfinitePointsToWhereTheyWereSeen) {
   const auto camera = Camera(500);
   Map map;

@@ -6,7 +6,9 @@
 #include <algorithm>
 #include <cmath>
 #include <memory>
+#include <opencv2/core/mat.hpp>
 #include <utility>
+#include <vector>
 
 #include "tests/engine/tracking/tracked_image.h"
 
@@ -99,6 +101,62 @@ TEST_F(KnownRoom, IsLostSoonWhenTheCameraWalksAwayAndTurns) {
   const int frames = FramesByRotation(this, -0.02);
   EXPECT_GE(frames, 18);
   EXPECT_LE(frames, 32);
+}
+
+// A camera with a rolling shutter that pans over the known room, in maps whose images were taken while it
+// turned at another rate, and which tell no readout time yet.
+class RollingShutterInKnownRoom : public KnownRoom {
+ public:
+  static constexpr double kReadout_s = 0.02, kSlow = 0.05, kFast = 0.7;  // radians per second
+
+  static std::shared_ptr<const CameraModel> Turning(double rate, double readout_s) {
+    return std::make_shared<CameraModel>(CameraModel::WithReadout(Camera(), {{0, -rate, 0}, {0, readout_s}}));
+  }
+  static std::shared_ptr<const MapSnapshot> MapFromImagesThatTurned(double rate) {
+    const std::vector<Rigid3> poses = {CameraAt({0, 0, 0}), CameraAt({0.2, 0, 0})};
+    return testing_world::TrueMap(World(), Turning(rate, 0), poses).Snapshot();
+  }
+  static Rigid3 PanPose(int frame) {
+    return CameraAt({0.01 * frame, 0, 0}, {0, kFast * frame / 30 * 180 / M_PI - 8, 0});
+  }
+  // Pans from one frame to another one, and returns the largest error of a position in the last five frames.
+  double Pan(const MapSnapshot& map, int from, int to) {
+    double largest = 0;
+    for (int i = from; i <= to; ++i) {
+      CameraImage image;
+      const cv::Mat pixels = World().Render(*Turning(kFast, kReadout_s), PanPose(i), 1.5, i);
+      const Frame frame = testing_world::MakeFrame(i, pixels);
+      image.time = frame.time;
+      image.camera = Camera();
+      image.features = MakeFeatures(frame.image);
+      const auto estimate = tracker_.Track(map, image, std::nullopt, policy_, &random_);
+      EXPECT_EQ(estimate.outcome, Outcome::kPose) << i;
+      tracker_.Accept(image, estimate.result, false);
+      const double error = (tracker_.last().OriginInSource() - PanPose(i).OriginInSource()).norm();
+      if (i > to - 5) largest = std::max(largest, error);
+    }
+    return largest;
+  }
+  void SetUp() override { tracker_.Begin(ImageAt(PanPose(0)).time, PanPose(0), ObservedMotion::kSixDof); }
+};
+
+TEST_F(RollingShutterInKnownRoom, TheReadoutTimeIsFoundInAMapFromImagesThatHardlyTurned) {
+  const double error = Pan(*MapFromImagesThatTurned(kSlow), 1, 12);
+  EXPECT_NEAR(tracker_.readout_s().y(), kReadout_s, 0.004);
+  EXPECT_DOUBLE_EQ(tracker_.readout_s().x(), 0);
+  EXPECT_LT(error, 0.005);
+}
+
+TEST_F(RollingShutterInKnownRoom, TheReadoutTimeIsLeftToTheMapperIfItHasImagesThatTurnedAsFast) {
+  Pan(*MapFromImagesThatTurned(kFast), 1, 12);
+  EXPECT_EQ(tracker_.readout_s(), Eigen::Vector2d::Zero());
+}
+
+TEST_F(RollingShutterInKnownRoom, AnEstimateEndsWhenTheMapperFindsNoneInFasterImages) {
+  Pan(*MapFromImagesThatTurned(kSlow), 1, 8);
+  ASSERT_GT(tracker_.readout_s().y(), 0);
+  Pan(*MapFromImagesThatTurned(kFast), 9, 12);
+  EXPECT_EQ(tracker_.readout_s(), Eigen::Vector2d::Zero());
 }
 
 TEST_F(KnownRoom, AlternatesThePatchComparison) {
