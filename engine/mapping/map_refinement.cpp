@@ -76,9 +76,8 @@ bool MapRefinement::AdjustToReadout() {
 }
 
 void MapRefinement::EstimateReadout(const TrackedCorners& corners) {
-  const auto used = ReadoutIn(workspace_->map, *corners.camera);
   const bool known = FindKnownReadout(*corners.camera) != known_readouts_.end();
-  if (!MayEstimateReadout() || known || !used || !used->isZero(0)) return;
+  if (!MayEstimateReadout() || known || !ReadoutIn(workspace_->map, *corners.camera)) return;
   const auto estimate = EstimateTrackReadout(options_.track_readout, *corners.camera, corners.sequence);
   const auto prior = estimate ? SignificantReadout(options_.track_readout, *estimate) : std::nullopt;
   if (!prior) return;

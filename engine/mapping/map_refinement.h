@@ -53,7 +53,7 @@ class MapRefinement {
   void AdjustAroundNewest();
   // What the corners of the initialization tell of the readout time of a lens.
   void SetReadoutPrior(const std::optional<ReadoutPrior>& prior, std::shared_ptr<const CameraModel> lens);
-  // Estimates the readout time from corners if it is not known yet, and adjusts the map if it changes.
+  // Estimates the readout time from corners if none have told it yet, and adjusts the map if it changes.
   void EstimateReadout(const TrackedCorners& corners);
   // Estimates the readout time of the newest keyframe's camera. True if it changed, so that the map has to be
   // adjusted.

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <cmath>
 #include <stop_token>
 #include <string>
 #include <thread>
@@ -172,33 +173,56 @@ TEST_F(MapperTest, ExtendsTheMapByKeyframesUntilIdle) {
   EXPECT_GT(mapper.Times().other, 0);
 }
 
-TEST_F(MapperTest, LearnsTheReadoutTimeFromCornersAfterItsStart) {
-  InitialPair pair = *pair_;
-  const auto camera = [](double rate) {
+// The first two views of a camera that turned meanwhile, with this readout time.
+InitialPair TurningPair(const InitialPair& views, double readout_s) {
+  const auto camera = [&](double rate) {
     return std::make_shared<CameraModel>(
-        CameraModel::WithReadout(MapperCamera(), {{0, rate, 0}, Eigen::Vector2d::Zero()}));
+        CameraModel::WithReadout(MapperCamera(), {{0, rate, 0}, {0, readout_s}}));
   };
+  InitialPair pair = views;
   pair.a.camera = camera(0.2);
   pair.b.camera = camera(-0.2);
+  return pair;
+}
+
+// Corners before a camera whose readout takes 20 ms.
+TrackedCorners CornersOfARollingShutter() {
   testing_world::RolledScene scene;
   scene.camera = *MapperCamera();
-  const TrackedCorners corners{MapperCamera(), ShowCorners(scene)};
-  const auto readout = [](const Mapper& mapper) -> Eigen::Vector2d {
-    return mapper.Snapshot()->keyframes.back().camera->readout_motion().readout_s;
-  };
+  return {MapperCamera(), ShowCorners(scene)};
+}
+
+Eigen::Vector2d ReadoutOfNewest(const Mapper& mapper) {
+  return mapper.Snapshot()->keyframes.back().camera->readout_motion().readout_s;
+}
+
+TEST_F(MapperTest, LearnsTheReadoutTimeFromCornersAfterItsStart) {
+  const TrackedCorners corners = CornersOfARollingShutter();
   Mapper mapper({});
   mapper.Offer(corners);
   WorkUntilIdle(&mapper);
   EXPECT_EQ(mapper.Snapshot(), nullptr) << "there is no map yet";
-  mapper.Start(pair);
+  mapper.Start(TurningPair(*pair_, 0));
   WorkUntilIdle(&mapper);
   ASSERT_NE(mapper.Snapshot(), nullptr);
-  ASSERT_TRUE(readout(mapper).isZero(0));
+  ASSERT_TRUE(ReadoutOfNewest(mapper).isZero(0));
   mapper.Offer(corners);
   WorkUntilIdle(&mapper);
-  EXPECT_NEAR(readout(mapper).y(), 0.02, 0.004);
-  EXPECT_EQ(readout(mapper).x(), 0);
+  EXPECT_NEAR(ReadoutOfNewest(mapper).y(), 0.02, 0.004);
+  EXPECT_EQ(ReadoutOfNewest(mapper).x(), 0);
   EXPECT_EQ(Validate(*mapper.Snapshot()), "");
+}
+
+TEST_F(MapperTest, CorrectsAReadoutTimeThatNoCornersHaveTold) {
+  Mapper mapper({});
+  mapper.Start(TurningPair(*pair_, 0.035));
+  WorkUntilIdle(&mapper);
+  ASSERT_NE(mapper.Snapshot(), nullptr);
+  ASSERT_FALSE(ReadoutOfNewest(mapper).isZero(0));
+  ASSERT_GT(std::abs(ReadoutOfNewest(mapper).y() - 0.02), 0.006);
+  mapper.Offer(CornersOfARollingShutter());
+  WorkUntilIdle(&mapper);
+  EXPECT_NEAR(ReadoutOfNewest(mapper).y(), 0.02, 0.004);
 }
 
 TEST_F(MapperTest, AcceptsNoMoreThanItsQueueHolds) {
