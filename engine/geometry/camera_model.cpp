@@ -1,166 +1,16 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "engine/geometry/camera_model.h"
 
-#include <algorithm>
 #include <cmath>
-#include <limits>
 #include <numbers>
 #include <ostream>
 #include <sstream>
-#include <vector>
 
+#include "engine/geometry/lens_distortion.h"
 #include "engine/geometry/plain_vector3.h"
-#include "engine/geometry/polynomial.h"
 
 namespace docent::engine {
 namespace {
-
-constexpr double kPi = std::numbers::pi;
-// Tangent of the largest angle of lens models limited to less than 90 degrees from the axis (89.94 degrees).
-constexpr double kMaxRadius = 1000.0;
-// The one-to-one range ends slightly before the radius at which the image radius stops growing.
-constexpr double kRangeMargin = 1 - 1e-6;
-constexpr int kMaxNewtonSteps = 100;
-
-// The argument up to which the polynomial, positive at zero, stays positive; `limit` if it always does.
-double PositiveUpTo(const std::vector<double>& coefficients, double limit) {
-  const std::vector<double> changes = SignChanges(coefficients, limit);
-  return changes.empty() ? limit : changes.front() * kRangeMargin;
-}
-
-// Largest radius (tangent of the angle) of the Brown model's one-to-one range. The Jacobian of the distortion
-// is symmetric; at radius r its radial part has the eigenvalues d(r) and (r d(r))', and its tangential part's
-// are at least -6 |p| r. Where it is positive definite on a disc the mapping is one-to-one there.
-double LargestBrownRadius(const std::array<double, 5>& k) {
-  const double tangential = -6 * std::hypot(k[2], k[3]);
-  const std::vector<double> across = {1, tangential, k[0], 0, k[1], 0, k[4]};
-  const std::vector<double> along = {1, tangential, 3 * k[0], 0, 5 * k[1], 0, 7 * k[4]};
-  return std::min(PositiveUpTo(across, kMaxRadius), PositiveUpTo(along, kMaxRadius));
-}
-
-double LargestKannalaBrandtAngle(const std::array<double, 5>& k) {
-  return PositiveUpTo({1, 0, 3 * k[0], 0, 5 * k[1], 0, 7 * k[2], 0, 9 * k[3]}, kPi);
-}
-
-// atan(x) / x and tan(x) / x, also at zero.
-double ArcTangentRatio(double x) {
-  return std::abs(x) < 1e-4 ? 1 - x * x / 3 : std::atan(x) / x;
-}
-double TangentRatio(double x) {
-  return std::abs(x) < 1e-4 ? 1 + x * x / 3 : std::tan(x) / x;
-}
-
-// Distorted radius of the Brown model without its tangential part, and its derivative.
-double BrownRadius(const std::array<double, 5>& k, double r, double* derivative) {
-  const double s = r * r;
-  *derivative = 1 + s * (3 * k[0] + s * (5 * k[1] + s * 7 * k[4]));
-  return r * (1 + s * (k[0] + s * (k[1] + s * k[4])));
-}
-
-double KannalaBrandtRadius(const std::array<double, 5>& k, double angle, double* derivative) {
-  const double s = angle * angle;
-  *derivative = 1 + s * (3 * k[0] + s * (5 * k[1] + s * (7 * k[2] + s * 9 * k[3])));
-  return angle * (1 + s * (k[0] + s * (k[1] + s * (k[2] + s * k[3]))));
-}
-
-// Solves radius(x) = target on [0, limit], where radius grows from zero to at least the target: Newton's
-// method, with bisection where a step leaves the bracket.
-double InvertRadius(double (*radius)(const std::array<double, 5>&, double, double*),
-                    const std::array<double, 5>& k, double target, double limit) {
-  double low = 0, high = limit, x = std::min(target, limit);
-  for (int i = 0; i < kMaxNewtonSteps; ++i) {
-    double derivative;
-    const double error = radius(k, x, &derivative) - target;
-    (error > 0 ? high : low) = x;
-    double next = x - error / derivative;
-    if (!(next >= low && next <= high)) {
-      next = 0.5 * (low + high);
-    }
-    const double step = std::abs(next - x);
-    x = next;
-    if (step <= 4 * std::numeric_limits<double>::epsilon() * x) {
-      break;
-    }
-  }
-  return x;
-}
-
-// The Brown model on the plane z = 1 with its (symmetric) Jacobian. `Out` receives x, y, xx, xy, yy as in
-// CameraModel::ImagePoint. After inlining, outputs that the caller does not use are not computed.
-template <typename Out>
-inline void BrownDistort(const std::array<double, 5>& k, double x, double y, Out* out) {
-  const double s = x * x + y * y;
-  const double radial = 1 + s * (k[0] + s * (k[1] + s * k[4]));
-  const double twice_slope = 2 * (k[0] + s * (2 * k[1] + s * 3 * k[4]));  // derivative of radial by s
-  const double px = k[3], py = k[2];
-  const double scale = radial + 2 * (px * x + py * y);
-  out->x = scale * x + px * s;
-  out->y = scale * y + py * s;
-  out->xx = scale + (twice_slope * x + 4 * px) * x;
-  out->xy = twice_slope * x * y + 2 * (px * y + py * x);
-  out->yy = scale + (twice_slope * y + 4 * py) * y;
-}
-
-struct BrownError {
-  double x = 0, y = 0, xx = 0, xy = 0, yy = 0;
-  double norm = 0;
-
-  BrownError(const std::array<double, 5>& k, const Eigen::Vector2d& at, const Eigen::Vector2d& distorted) {
-    BrownDistort(k, at.x(), at.y(), this);
-    x -= distorted.x();
-    y -= distorted.y();
-    norm = std::hypot(x, y);
-  }
-  Eigen::Vector2d NewtonStep() const {
-    const double determinant = xx * yy - xy * xy;
-    return {(yy * x - xy * y) / determinant, (xx * y - xy * x) / determinant};
-  }
-};
-
-// Inverse of BrownDistort within the radius, or empty. Starts at the solution without the tangential part and
-// continues with Newton steps that are halved until they reduce the error.
-std::optional<Eigen::Vector2d> BrownUndistort(const std::array<double, 5>& k,
-                                              const Eigen::Vector2d& distorted, double max_radius,
-                                              double max_image_radius) {
-  const double image_radius = distorted.norm();
-  const bool is_radial = k[2] == 0 && k[3] == 0;
-  if (image_radius == 0 && is_radial) {
-    return Eigen::Vector2d::Zero().eval();
-  }
-  if (!std::isfinite(image_radius) || (is_radial && image_radius > max_image_radius)) {
-    return std::nullopt;
-  }
-  Eigen::Vector2d x = distorted;
-  if (image_radius > 0) {
-    const double radius = InvertRadius(BrownRadius, k, std::min(image_radius, max_image_radius), max_radius);
-    x *= radius / image_radius;
-  }
-  if (is_radial) {
-    return x;
-  }
-  const double tolerance = 1e-14 * (1 + image_radius);
-  BrownError error(k, x, distorted);
-  for (int i = 0; i < kMaxNewtonSteps && error.norm > tolerance; ++i) {
-    Eigen::Vector2d step = error.NewtonStep();
-    Eigen::Vector2d next = x - step;
-    BrownError next_error(k, next, distorted);
-    for (int halving = 0; halving < 30 && (next.norm() > max_radius || next_error.norm > error.norm);
-         ++halving) {
-      step *= 0.5;
-      next = x - step;
-      next_error = BrownError(k, next, distorted);
-    }
-    if (!(next.norm() <= max_radius) || !(next_error.norm < error.norm)) {
-      break;
-    }
-    x = next;
-    error = next_error;
-  }
-  if (!(error.norm <= 1e-10 * (1 + image_radius))) {
-    return std::nullopt;
-  }
-  return x;
-}
 
 // A rotation by a rotation vector, to second order: of 0.05 radians, wrong by 0.00002.
 inline PlainVector3 SmallRotation(const PlainVector3& rotation, const PlainVector3& point) {
@@ -203,7 +53,7 @@ std::optional<std::string> ComplainAboutDistortion(LensModel lens, const std::ar
       return Sentence(what.c_str(), distortion[i], "zero, because this lens does not use it");
     }
   }
-  if (lens == LensModel::kFov && !(distortion[0] >= 0 && distortion[0] < kPi)) {
+  if (lens == LensModel::kFov && !(distortion[0] >= 0 && distortion[0] < std::numbers::pi)) {
     return Sentence("The FOV lens's omega", distortion[0], "at least 0 and less than pi radians");
   }
   return std::nullopt;
@@ -233,10 +83,11 @@ CameraModel::CameraModel(LensModel lens, const Intrinsics& intrinsics,
     }
     case LensModel::kFov: {
       const double omega = distortion[0];
-      max_radius_squared_ = kMaxRadius * kMaxRadius;
-      max_angle_ = std::atan(kMaxRadius);
+      max_radius_squared_ = kLargestPlaneRadius * kLargestPlaneRadius;
+      max_angle_ = std::atan(kLargestPlaneRadius);
       fov_scale_ = TangentRatio(omega / 2);
-      max_image_radius_ = kMaxRadius * fov_scale_ * ArcTangentRatio(kMaxRadius * fov_scale_ * omega);
+      max_image_radius_ =
+          kLargestPlaneRadius * fov_scale_ * ArcTangentRatio(kLargestPlaneRadius * fov_scale_ * omega);
       break;
     }
     case LensModel::kKannalaBrandt:
