@@ -195,7 +195,9 @@ void PoseTracker::UpdateReadout(const MapSnapshot& map) {
 bool PoseTracker::MayEstimateReadout() const {
   // What an unknown readout time has bent in the map is at most a third of what it does to this image.
   constexpr double kFasterThanMap = 3;
-  return !readout_is_known_ &&
+  // While this camera's calibration is not known, the errors of its map look like a readout time.
+  const bool may_use_map = largest_rate_in_map_ == 0 || options_.initializer.estimate_readout;
+  return !readout_is_known_ && may_use_map &&
          image_camera_->readout_motion().rotation_rate.norm() > kFasterThanMap * largest_rate_in_map_;
 }
 

@@ -24,6 +24,8 @@ using Outcome = PoseTracker::Estimate::Outcome;
 
 class KnownRoom : public ::testing::Test {
  public:
+  explicit KnownRoom(const TrackerOptions& options = {}) : tracker_(options, Camera()) {}
+
   static Rigid3 Pose(int frame) { return CameraAt({0.01 * frame, 0, 0}, {0, 0.2 * frame, 0}); }
   static const std::shared_ptr<const MapSnapshot>& TheMap() {
     static const auto map =
@@ -43,7 +45,7 @@ class KnownRoom : public ::testing::Test {
     }
   }
 
-  PoseTracker tracker_{TrackerOptions(), Camera()};
+  PoseTracker tracker_;
   KeyFramePolicy policy_{KeyFramePolicyOptions(), 1.3};
   Random random_{1};
 };
@@ -107,6 +109,7 @@ TEST_F(KnownRoom, IsLostSoonWhenTheCameraWalksAwayAndTurns) {
 // turned at another rate, and which tell no readout time yet.
 class RollingShutterInKnownRoom : public KnownRoom {
  public:
+  using KnownRoom::KnownRoom;
   static constexpr double kReadout_s = 0.02, kSlow = 0.05, kFast = 0.7;  // radians per second
 
   static std::shared_ptr<const CameraModel> Turning(double rate, double readout_s) {
@@ -149,6 +152,21 @@ TEST_F(RollingShutterInKnownRoom, TheReadoutTimeIsFoundInAMapFromImagesThatHardl
 
 TEST_F(RollingShutterInKnownRoom, TheReadoutTimeIsLeftToTheMapperIfItHasImagesThatTurnedAsFast) {
   Pan(*MapFromImagesThatTurned(kFast), 1, 12);
+  EXPECT_EQ(tracker_.readout_s(), Eigen::Vector2d::Zero());
+}
+
+class UnknownCalibrationInKnownRoom : public RollingShutterInKnownRoom {
+ public:
+  static TrackerOptions Options() {
+    TrackerOptions options;
+    options.initializer.estimate_readout = false;
+    return options;
+  }
+  UnknownCalibrationInKnownRoom() : RollingShutterInKnownRoom(Options()) {}
+};
+
+TEST_F(UnknownCalibrationInKnownRoom, NoReadoutTimeIsEstimated) {
+  Pan(*MapFromImagesThatTurned(kSlow), 1, 12);
   EXPECT_EQ(tracker_.readout_s(), Eigen::Vector2d::Zero());
 }
 
