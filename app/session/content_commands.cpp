@@ -172,6 +172,7 @@ content::SurfaceHit ContentCommands::PlaceFor(const engine::TrackedFrame& frame,
 
 void ContentCommands::Apply(const PlaceTrail& command, const engine::TrackedFrame& frame) {
   SessionMap& map = MapToEdit(frame);
+  RequirePose(frame);  // The trail's width is chosen by the distance from the camera.
   std::vector<Eigen::Vector3d> points;
   Eigen::Vector3d normals = Eigen::Vector3d::Zero();
   for (const MapPoint& point : command.points) {
@@ -189,12 +190,14 @@ void ContentCommands::Apply(const PlaceTrail& command, const engine::TrackedFram
 
 void ContentCommands::Apply(const ExtendTrail& command, const engine::TrackedFrame& frame) {
   SessionMap& map = MapToEdit(frame);
-  const Eigen::Vector3d point = PlaceFor(frame, command.point).point;
+  const Eigen::Vector3d point =
+      command.point.pixel ? SurfaceFor(frame, *command.point.pixel).point : command.point.in_map;
   Edit(&map, content::AddPointEdit(*map.scene, command.name, point));
 }
 
 void ContentCommands::Apply(const PlaceOccluder& command, const engine::TrackedFrame& frame) {
   SessionMap& map = MapToEdit(frame);
+  RequirePose(frame);  // An occluder faces the camera.
   std::vector<content::SurfaceHit> places;
   for (const MapPoint& point : command.points) places.push_back(PlaceFor(frame, point));
   content::Entity entity =

@@ -21,9 +21,7 @@ struct PointedAt {
 
 PointedAt PointAt(const engine::TrackedFrame& frame, const engine::CameraModel& camera,
                   const Eigen::Vector2d& pixel) {
-  if (!engine::HasPose(frame.state) || !frame.map) {
-    throw Error("nothing can be placed while the camera is lost");
-  }
+  RequirePose(frame);
   PointedAt at;
   at.pixel = "pixel " + std::to_string(std::lround(pixel.x())) + " " + std::to_string(std::lround(pixel.y()));
   if (!camera.IsInside(pixel, -0.5)) throw Error(at.pixel + " lies outside the image");
@@ -64,6 +62,11 @@ void AddMeasuredPoints(const engine::TrackedFrame& frame, const engine::CameraMo
 }
 
 }  // namespace
+
+void RequirePose(const engine::TrackedFrame& frame) {
+  if (!engine::HasPose(frame.state) || !frame.map)
+    throw Error("nothing can be placed while the camera is lost");
+}
 
 content::SurfaceHit SurfaceAtPixel(const engine::TrackedFrame& frame, const engine::CameraModel& camera,
                                    const Eigen::Vector2d& pixel) {

@@ -10,6 +10,9 @@
 // Finds the point of the map's surface at a pixel that a user points at. Pure functions; any thread.
 namespace docent::app {
 
+// Throws Error with one sentence when the frame has no pose.
+void RequirePose(const engine::TrackedFrame& frame);
+
 // The surface that the frame shows at a pixel: at the distance that the images of keyframes tell, else where
 // the map points around the pixel are. Throws Error with one sentence when the frame has no pose, the pixel
 // no ray, or the map no surface there.

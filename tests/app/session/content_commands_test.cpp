@@ -268,6 +268,26 @@ TEST_F(ContentInASession, EveryCommandChangesTheContentAndIsUndone) {
   });
 }
 
+TEST_F(ContentInASession, NothingIsPlacedAtCoordinatesWhileTheCameraIsLost) {
+  Run([&] {
+    const MapPoint a{{0, 0, 1}}, b{{0, 0.5, 2}}, c{{0, 0.5, 3}};
+    ASSERT_EQ(Do(PlaceTrail{{a, b}}), "");
+    const std::string before = content::EncodeScene(Scene());
+    const engine::TrackedFrame posed = frame_;
+    frame_.state = engine::TrackingState::kLost;
+    frame_.map.reset();
+    EXPECT_EQ(Do(PlaceTrail{{a, b}}), "nothing can be placed while the camera is lost");
+    EXPECT_EQ(Do(PlaceOccluder{content::Occluder::Shape::kBox, std::nullopt, {a}}),
+              "nothing can be placed while the camera is lost");
+    // A point is added where it is told, wherever the camera is.
+    EXPECT_EQ(Do(ExtendTrail{"trail-1", c}), "");
+    frame_ = posed;
+    EXPECT_EQ(Named("trail-1").trail.points.size(), 3);
+    ASSERT_EQ(Do(Undo{}), "");
+    EXPECT_EQ(content::EncodeScene(Scene()), before);
+  });
+}
+
 TEST_F(ContentInASession, AnAlignedModelHasThePoseThatItsPointsDetermine) {
   Run([&] {
     ASSERT_EQ(Do(PlaceModel{"exhibit.glb", kPixel}), "");
