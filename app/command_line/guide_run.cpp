@@ -284,6 +284,9 @@ CameraRun GuideRun::RunOf(std::size_t i, const Show& show) {
   run.options.trouble = [this, &state, &show](const std::string& sentence, Timestamp time) {
     HandleTrouble(sentence, time, show, &state);
   };
+  run.options.disconnected = [this, &state, &show](const engine::TrackedFrame* last) {
+    HandleDisconnected(last, show, &state);
+  };
   // What is recorded has the images in their order.
   if (host_ && !request_.headless && !request_.record && !request_.on_image)
     run.options.untracked = [this, &show](const engine::Frame& image) { HandleUntracked(image, show); };
@@ -407,13 +410,26 @@ void GuideRun::HandleFrame(const engine::TrackedFrame& tracked, const Show& show
 void GuideRun::HandleIdle(const engine::TrackedFrame& tracked, bool at_end, const Show& show,
                           CameraState* state) {
   if (Interruption::requested()) stop_.request_stop();
+  if (at_end && !std::exchange(state->has_ended, true)) {
+    const std::scoped_lock lock(files_mutex_);
+    files_->Add({Event{tracked.frame.time, "camera", "The images have ended; the last one stays."}});
+  }
+  ShowAgain(tracked, at_end ? kEnded : kPaused, show, state);
+}
+
+void GuideRun::HandleDisconnected(const engine::TrackedFrame* last, const Show& show, CameraState* state) {
+  if (Interruption::requested()) stop_.request_stop();
+  // Only an author changes content meanwhile.
+  if (last != nullptr && has_author_window()) ShowAgain(*last, "", show, state);
+}
+
+void GuideRun::ShowAgain(const engine::TrackedFrame& tracked, const std::string& message, const Show& show,
+                         CameraState* state) {
   std::shared_ptr<ShownFrame> frame;
   {
     const std::scoped_lock lock(files_mutex_);
     frame = MakeShown(tracked, state);
-    if (frame->message.empty()) frame->message = at_end ? kEnded : kPaused;
-    if (at_end && !std::exchange(state->has_ended, true))
-      files_->Add({Event{tracked.frame.time, "camera", "The images have ended; the last one stays."}});
+    if (frame->message.empty()) frame->message = message;
     const std::vector<Event> events = session_.TakeEvents();
     files_->Add(events);
     Warn(events);

@@ -81,6 +81,12 @@ class GuideRun {
   void TakeAnswer(const ShownFrame& frame, CameraState* state);
   // Between images of a paused recording, and after its last one.
   void HandleIdle(const engine::TrackedFrame& tracked, bool at_end, const Show& show, CameraState* state);
+  // See FrameLoopOptions::disconnected.
+  void HandleDisconnected(const engine::TrackedFrame* last, const Show& show, CameraState* state);
+  // Shows the last image with its content as it is now, if that has changed. `message`: where there is no
+  // other.
+  void ShowAgain(const engine::TrackedFrame& tracked, const std::string& message, const Show& show,
+                 CameraState* state);
   bool has_author_window() const { return request_.may_write && !request_.headless; }
   void Warn(const std::vector<Event>& events);
   void Direct(const std::shared_ptr<const ShownFrame>& frame);

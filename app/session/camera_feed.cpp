@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "app/session/camera_feed.h"
 
+#include <algorithm>
+
 namespace docent::app {
 
 void GapReporter::Report(const engine::Frame& frame, const FrameCallback& shown) {
@@ -37,8 +39,7 @@ bool CameraFeed::Fetch(const std::stop_token& stop) {
       if (run_.options.trouble) run_.options.trouble(trouble_, frame_.time);
     }
     if (frame_.image.empty()) {
-      // The device may stay away for long, but the person is still there.
-      CarryOutGiven();
+      ContinueDisconnected();
       continue;
     }
     if (live_) gaps_.Report(frame_, run_.shown);
@@ -109,6 +110,12 @@ void CameraFeed::ReportUntracked() {
 
 void CameraFeed::CarryOutGiven() {
   if (last_tracked_) command_runner_.RunGiven(last_tracked_->frame.time - *first_time_, *last_tracked_);
+}
+
+void CameraFeed::ContinueDisconnected() {
+  CarryOutGiven();
+  if (last_tracked_) session_->Idle(std::max(frame_.time, last_tracked_->frame.time));
+  if (run_.options.disconnected) run_.options.disconnected(last_tracked_ ? &*last_tracked_ : nullptr);
 }
 
 void CameraFeed::Pause(const std::stop_token& stop) {

@@ -85,6 +85,8 @@ class CameraFeed {
   void ReportUntracked();
   // Carries out what the person wants while images are dropped or missing.
   void CarryOutGiven();
+  // The device may stay away for long, but the person is still there.
+  void ContinueDisconnected();
 
   const CameraRun& run_;
   Session* const session_;

@@ -60,6 +60,10 @@ struct FrameLoopOptions {
   // Called when the source cannot deliver images, with a sentence for the wearer and the time on its clock,
   // and with an empty sentence when it delivers again. On the camera's thread; may be empty.
   std::function<void(const std::string&, Timestamp)> trouble;
+  // Called a few times a second while a device is disconnected, with the last tracked frame, or null before
+  // the first one. The commands of the inbox are carried out and what has changed is saved in between. On the
+  // camera's thread; may be empty.
+  std::function<void(const engine::TrackedFrame* last)> disconnected;
   // Called for every tracked image, before its frame is passed on, with its age: for a device since its
   // timestamp, for a recording in realtime since the time at which it was due. On the camera's thread; may be
   // empty.

@@ -7,6 +7,7 @@
 #include <thread>
 
 #include "app/simulator/simulation.h"
+#include "tests/app/support/simulated_session.h"
 #include "tests/app/support/temporary_folder.h"
 
 namespace docent::app {
@@ -90,6 +91,64 @@ TEST(FrameLoop, ReportsTroubleOnceAndItsEndAndContinues) {
                               {1, Timestamp(900), ""}});
   EXPECT_THAT(played.troubles, ElementsAre("It was unplugged.", ""));
   EXPECT_THAT(played.frames, ElementsAre(std::pair(0ul, kLost), std::pair(1ul, kLost)));
+}
+
+// Delivers the images of a simulation, and is then disconnected for ten seconds.
+class CameraThatIsUnplugged : public FrameSource {
+ public:
+  explicit CameraThatIsUnplugged(const std::shared_ptr<const Simulation>& simulation)
+      : source_(OpenSimulation(simulation)) {
+    info_ = source_->info();
+  }
+  bool Next(engine::Frame* frame) override {
+    if (source_->Next(frame)) {
+      last_ = frame->time;
+      return true;
+    }
+    if (empty_ == kEmptyImages) return false;
+    *frame = engine::Frame();
+    frame->time = last_ + std::chrono::milliseconds(100) * ++empty_;
+    return true;
+  }
+  std::string trouble() const override { return empty_ > 0 ? "It was unplugged." : ""; }
+
+  static constexpr int kEmptyImages = 100;
+
+ private:
+  std::unique_ptr<FrameSource> source_;
+  Timestamp last_{};
+  int empty_ = 0;
+};
+
+TEST(FrameLoop, SavesWhatIsChangedWhileTheCameraIsDisconnected) {
+  const auto simulation = simulated_session::Room(2.5);
+  const TemporaryFolder folder;
+  maps::Library library =
+      maps::Library::Open(folder / "l.docent", maps::Access::kReadWrite, maps::CreateIfMissing::kYes);
+  SessionOptions options = simulated_session::Options(Pace::kLockstep, "Bay");
+  options.autosave_interval = std::chrono::seconds(1);
+  Session session(options, simulated_session::LensOf(*simulation), &library);
+  CalibratedCamera camera = Calibrate(std::make_unique<CameraThatIsUnplugged>(simulation), std::nullopt);
+  CommandInbox inbox;
+  FrameLoopOptions loop;
+  loop.pace = Pace::kLockstep;
+  loop.inbox = &inbox;
+  const auto is_saved = [&] {
+    const auto maps = library.List();
+    return !maps.empty() && library.LoadScene(maps.front().key).text.find("seen later") != std::string::npos;
+  };
+  int calls = 0;
+  loop.disconnected = [&](const engine::TrackedFrame* last) {
+    ASSERT_NE(last, nullptr);
+    if (++calls == 1) inbox.Push({PlaceSignpost{"seen later", {320, 290}, ""}, nullptr});
+    if (calls < CameraThatIsUnplugged::kEmptyImages) return;
+    // The library is written on another thread.
+    for (int i = 0; i < 6000 && !is_saved(); ++i) std::this_thread::sleep_for(std::chrono::milliseconds(10));
+    EXPECT_TRUE(is_saved());
+  };
+  RunFrames(&camera, &session, loop, [](const engine::TrackedFrame&) {}, {});
+  EXPECT_EQ(calls, CameraThatIsUnplugged::kEmptyImages);
+  session.Finish();
 }
 
 // A clock that advances only when the test says so.
