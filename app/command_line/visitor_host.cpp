@@ -96,6 +96,8 @@ void VisitorHost::Guide(std::size_t index, const engine::CameraModel& camera,
   if (index == 0) WatchForNextVisitor(*frame);
   GuideAgain(index, camera, frame);
   if (index != 0 || !visits_) return;
+  // These images belong to no visit: neither to that of the visitor who has left nor to the next one.
+  if (left_tour_ && left_tour_->is_between_visits()) return;
   visits_->Add(*frame, route_ ? &*route_ : nullptr);
   ReportProblem(visits_->TakeProblem(), frame->tracked.frame.time);
 }

@@ -25,6 +25,8 @@ class LeftTour {
   bool Update(double seconds, const cv::Mat& image, bool is_begun);
   // Whether the visitor is to be asked at present.
   bool is_asking() const { return asked_s_.has_value(); }
+  // Whether nobody uses the device, or its visitor has yet to say whether the tour goes on.
+  bool is_between_visits() const { return idle_watch_.is_left() || is_asking(); }
   // The visitor has decided.
   void Answer() { asked_s_.reset(); }
 

@@ -58,6 +58,24 @@ TEST(LeftTour, AsksAfterALongTimeWithoutImages) {
   EXPECT_TRUE(device.tour.is_asking());
 }
 
+TEST(LeftTour, KnowsTheTimeBetweenTwoVisits) {
+  Device device(true);
+  device.BeCarried(100);
+  EXPECT_FALSE(device.tour.is_between_visits());
+  device.Lie(400);
+  EXPECT_TRUE(device.tour.is_between_visits()) << "nobody is there";
+  device.BeCarried(10);
+  EXPECT_TRUE(device.tour.is_between_visits()) << "the visitor is asked";
+  device.tour.Answer();
+  EXPECT_FALSE(device.tour.is_between_visits());
+  Device kiosk(false);
+  kiosk.BeCarried(100);
+  kiosk.Lie(4000);
+  EXPECT_TRUE(kiosk.tour.is_between_visits());
+  kiosk.BeCarried(1);
+  EXPECT_FALSE(kiosk.tour.is_between_visits());
+}
+
 TEST(LeftTour, DoesNotAskWhereNothingWasBegunOrNobodyCanAnswer) {
   Device unused(true), unasked(false);
   unused.is_begun = false;
