@@ -121,10 +121,18 @@ VisitRecord VisitFrom(const Json& json) {
   return visit;
 }
 
+// Whether the last line of a file has no end: a full disk has cut it off.
+bool IsLineCutOff(int file) {
+  const off_t size = lseek(file, 0, SEEK_END);
+  char last = '\n';
+  return size > 0 && pread(file, &last, 1, size - 1) == 1 && last != '\n';
+}
+
 // Throws Error.
-void AppendLine(const std::filesystem::path& path, const std::string& line) {
-  const int file = open(path.c_str(), O_WRONLY | O_APPEND | O_CREAT | O_CLOEXEC, 0644);
+void AppendLine(const std::filesystem::path& path, std::string line) {
+  const int file = open(path.c_str(), O_RDWR | O_APPEND | O_CREAT | O_CLOEXEC, 0644);
   if (file < 0) throw Error("cannot write " + path.string() + ": " + std::generic_category().message(errno));
+  if (IsLineCutOff(file)) line.insert(0, 1, '\n');
   const ssize_t written = write(file, line.data(), line.size());
   const int problem = written < 0 ? errno : ENOSPC;
   close(file);

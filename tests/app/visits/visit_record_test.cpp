@@ -161,6 +161,19 @@ TEST(VisitLog, LosesOnlyTheLinesThatCannotBeRead) {
   EXPECT_THAT(ErrorOf([&] { ReadVisits(folder / "none", &problems); }), HasSubstr("Cannot read the folder"));
 }
 
+TEST(VisitLog, BeginsANewLineAfterOneThatAFullDiskHasCutOff) {
+  const TemporaryFolder folder;
+  folder.Write("visits-2026-03-01.jsonl", VisitToJson(SampleVisit()).substr(0, 200));
+  {
+    VisitLog log(folder / "");
+    log.Add(SampleVisit());
+    log.Close();
+  }
+  std::vector<std::string> problems;
+  EXPECT_THAT(ReadVisits(folder / "", &problems), ElementsAre(SampleVisit()));
+  EXPECT_THAT(problems, ElementsAre(HasSubstr("line 1")));
+}
+
 // A changed byte gives another record or a sentence, never a crash; what is read can be written and read
 // again.
 TEST(VisitLog, SurvivesDamagedLines) {
