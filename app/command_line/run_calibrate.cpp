@@ -126,6 +126,8 @@ void RunCalibrate(const CalibrateOptions& options, Verbosity verbosity) {
     Progress progress(source->info().name, source->info().frame_count, verbosity);
     collector.Run(&progress);
   }
+  // A calibration from a part of the views must not replace an older, better one.
+  if (Interruption::requested()) throw Error("Interrupted; nothing was written.");
   CalibrationOptions calibration_options;
   calibration_options.lens = options.lens;
   const Calibration calibration =
