@@ -19,7 +19,8 @@ void GuideFiles::Add(const ShownFrame& frame) {
   if (!output_) return;
   output_->Add(frame.tracked, frame.shown.map_name);
   if (frame.shown.scene && frame.tracked.frame.camera == 0)
-    augmentations_->Add(frame.tracked, camera_, frame.shown.map_name, *frame.shown.scene);
+    augmentations_->Add(frame.tracked, frame.camera ? *frame.camera : camera_, frame.shown.map_name,
+                        *frame.shown.scene);
   if (guidance_ && frame.way) guidance_->Add(frame.tracked, frame.shown.map_name, *frame.way);
 }
 

@@ -16,7 +16,7 @@ namespace docent::app {
 class GuideFiles {
  public:
   // `first_camera` projects the content that was drawn over the first camera's images into the log of
-  // augmentations. Throws Error when a file cannot be created.
+  // augmentations, unless a frame has a model of its own. Throws Error when a file cannot be created.
   GuideFiles(const GuideRequest& request, const engine::CameraModel& first_camera);
 
   void Add(const ShownFrame& frame);

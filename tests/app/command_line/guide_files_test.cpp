@@ -1,0 +1,43 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "app/command_line/guide_files.h"
+
+#include <gmock/gmock.h>
+
+#include "app/files/text_file.h"
+#include "tests/app/support/temporary_folder.h"
+
+namespace docent::app {
+namespace {
+
+using ::testing::HasSubstr;
+
+engine::CameraModel CameraWithFocalLength(double focal_px) {
+  return {engine::LensModel::kRadialTangential, {640, 480, focal_px, focal_px, 320, 240}, {}};
+}
+
+TEST(GuideFiles, LogContentWhereTheCalibrationOfTheFrameShowsIt) {
+  const TemporaryFolder folder;
+  GuideRequest request;
+  request.output = folder / "out";
+  const engine::CameraModel first = CameraWithFocalLength(500);
+  GuideFiles files(request, first);
+  auto scene = std::make_shared<content::Scene>();
+  content::Entity& sign = scene->entities.emplace_back();
+  sign.kind = content::Entity::Kind::kSignpost;
+  sign.name = "sign-1";
+  sign.signpost.anchor = {1, 0, 5};
+  ShownFrame frame;
+  frame.tracked.state = engine::TrackingState::kSixDof;
+  frame.shown.map_name = "Hall";
+  frame.shown.scene = scene;
+  files.Add(frame);
+  frame.camera = std::make_shared<engine::CameraModel>(CameraWithFocalLength(400));
+  files.Add(frame);
+  files.Close();
+  const std::string text = ReadTextFile(folder / "out/augmentations.csv", 10'000);
+  EXPECT_THAT(text, HasSubstr("Hall,sign-1,420,240\n")) << "320 + 500 / 5";
+  EXPECT_THAT(text, HasSubstr("Hall,sign-1,400,240\n")) << "320 + 400 / 5";
+}
+
+}  // namespace
+}  // namespace docent::app
