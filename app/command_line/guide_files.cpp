@@ -24,8 +24,10 @@ void GuideFiles::Add(const ShownFrame& frame) {
   if (guidance_ && frame.way) guidance_->Add(frame.tracked, frame.shown.map_name, *frame.way);
 }
 
-void GuideFiles::Add(const TimedCommand& command) {
-  if (script_) script_->Write(FormatScriptLine(command) + '\n');
+void GuideFiles::Add(const TimedCommand& command, std::size_t camera) {
+  if (!script_) return;
+  const std::string prefix = camera == 0 ? "" : "# camera " + std::to_string(camera + 1) + ": ";
+  script_->Write(prefix + FormatScriptLine(command) + '\n');
 }
 
 void GuideFiles::Add(const std::vector<Event>& events) {

@@ -20,7 +20,8 @@ class GuideFiles {
   GuideFiles(const GuideRequest& request, const engine::CameraModel& first_camera);
 
   void Add(const ShownFrame& frame);
-  void Add(const TimedCommand& command);
+  // Only the commands of the first camera can be repeated; those of others become comments of the script.
+  void Add(const TimedCommand& command, std::size_t camera);
   void Add(const std::vector<Event>& events);
   void Close();
 

@@ -278,8 +278,8 @@ CameraRun GuideRun::RunOf(std::size_t i, const Show& show) {
     return host_ && host_->Lead(command, frame);
   };
   run.options.refused = [this, &state](const std::string& reason) { HandleRefused(reason, &state); };
-  run.options.carried_out = [this, &state](const TimedCommand& command) {
-    HandleCarriedOut(command, &state);
+  run.options.carried_out = [this, i, &state](const TimedCommand& command) {
+    HandleCarriedOut(command, i, &state);
   };
   run.options.trouble = [this, &state, &show](const std::string& sentence, Timestamp time) {
     HandleTrouble(sentence, time, show, &state);
@@ -330,7 +330,7 @@ void GuideRun::HandleRefused(const std::string& reason, CameraState* state) {
   }
 }
 
-void GuideRun::HandleCarriedOut(const TimedCommand& command, CameraState* state) {
+void GuideRun::HandleCarriedOut(const TimedCommand& command, std::size_t camera, CameraState* state) {
   if (has_author_window()) {
     notices_.Push({"", command.command});
   } else {
@@ -341,7 +341,7 @@ void GuideRun::HandleCarriedOut(const TimedCommand& command, CameraState* state)
       std::holds_alternative<NewMap>(command.command) || std::holds_alternative<UseMap>(command.command);
   if (begins) clock_.Resume();
   const std::scoped_lock lock(files_mutex_);
-  files_->Add(command);
+  files_->Add(command, camera);
 }
 
 void GuideRun::HandleTrouble(const std::string& sentence, Timestamp time, const Show& show,

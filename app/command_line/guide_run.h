@@ -71,7 +71,7 @@ class GuideRun {
   void WarnAboutUnknownLenses();
   CameraRun RunOf(std::size_t i, const Show& show);
   void HandleRefused(const std::string& reason, CameraState* state);
-  void HandleCarriedOut(const TimedCommand& command, CameraState* state);
+  void HandleCarriedOut(const TimedCommand& command, std::size_t camera, CameraState* state);
   void HandleTrouble(const std::string& sentence, Timestamp time, const Show& show, CameraState* state);
   void HandleFrame(const engine::TrackedFrame& tracked, const Show& show, CameraState* state);
   // Shows the visitor an image while an older one is tracked. See FrameLoopOptions::untracked.

@@ -4,12 +4,14 @@
 #include <gmock/gmock.h>
 
 #include "app/files/text_file.h"
+#include "app/script/script_file.h"
 #include "tests/app/support/temporary_folder.h"
 
 namespace docent::app {
 namespace {
 
 using ::testing::HasSubstr;
+using ::testing::SizeIs;
 
 engine::CameraModel CameraWithFocalLength(double focal_px) {
   return {engine::LensModel::kRadialTangential, {640, 480, focal_px, focal_px, 320, 240}, {}};
@@ -37,6 +39,23 @@ TEST(GuideFiles, LogContentWhereTheCalibrationOfTheFrameShowsIt) {
   const std::string text = ReadTextFile(folder / "out/augmentations.csv", 10'000);
   EXPECT_THAT(text, HasSubstr("Hall,sign-1,420,240\n")) << "320 + 500 / 5";
   EXPECT_THAT(text, HasSubstr("Hall,sign-1,400,240\n")) << "320 + 400 / 5";
+}
+
+TEST(GuideFiles, RecordCommandsOfASecondCameraAsComments) {
+  const TemporaryFolder folder;
+  GuideRequest request;
+  request.record_script = folder / "script.txt";
+  const engine::CameraModel first = CameraWithFocalLength(500);
+  GuideFiles files(request, first);
+  files.Add({std::chrono::seconds(2), 0, PlaceSignpost{"one", {10, 20}, ""}}, 0);
+  files.Add({std::chrono::seconds(1), 0, PlaceSignpost{"two", {30, 40}, ""}}, 1);
+  files.Add({std::chrono::seconds(3), 0, Undo{}}, 0);
+  files.Close();
+  const std::vector<TimedCommand> read = ReadScript(folder / "script.txt");
+  ASSERT_THAT(read, SizeIs(2));
+  EXPECT_EQ(std::get<PlaceSignpost>(read[0].command).text, "one");
+  EXPECT_TRUE(std::holds_alternative<Undo>(read[1].command));
+  EXPECT_THAT(ReadTextFile(folder / "script.txt", 10'000), HasSubstr("\n# camera 2: 1 signpost "));
 }
 
 }  // namespace
