@@ -78,7 +78,7 @@ void Tracker::SetMap(std::shared_ptr<const MapSnapshot> map, std::uint64_t map_k
   }
   if (initialization_.is_on() && !map_->HasFinitePoints()) {
     // The mapper made a panorama map of this tracker's first image.
-    if (same && IsTracked(state_)) return;
+    if (same) return;
     const KeyFrame& first = map_->keyframes.front();
     pose_.Begin(first.time, first.camera_from_map, ObservedMotion::kPanorama);
     initialization_.FirstIsMapped(first.time, first.camera_from_map);

@@ -37,10 +37,8 @@ class Lockstep {
       if (std::holds_alternative<MapperEvent::StartFailed>(event.what)) tracker_.StartFailed();
       events_.push_back(std::move(event));
     }
-    if (mapper_.Snapshot() != map_) {
-      map_ = mapper_.Snapshot();
-      tracker_.SetMap(map_, kMapKey);
-    }
+    map_ = mapper_.Snapshot();
+    if (map_) tracker_.SetMap(map_, kMapKey);
     return tracked;
   }
 

@@ -223,6 +223,28 @@ TEST(HybridTracker, IsLostWhenTheCameraTranslatesWhereOnlyInfinitePointsAreMappe
 
 // While a pose after a loss waits for confirmation, nothing is added to the map. When the camera then turns
 // to where nothing is mapped, the image alone could tell its rotation for seconds.
+// While the map has no depth, the camera returns from a loss to where it was, not to the map's first image.
+TEST(HybridTracker, IsFoundAgainWhereItHasTurnedTo) {
+  constexpr int kTurned = 50, kCovered = 2, kAgain = 10;
+  const RenderedWorld world = testing_world::Chamber(101);
+  const auto frame_at = [&](int i) {
+    const bool covered = i >= kTurned && i < kTurned + kCovered;
+    const double angle_deg = std::min(i, kTurned);
+    const cv::Mat image = covered
+                              ? cv::Mat(Camera()->height_px(), Camera()->width_px(), CV_8UC1, cv::Scalar(128))
+                              : world.Render(*Camera(), CameraAt({0, 0, 0}, {0, angle_deg, 0}), 1.5,
+                                             static_cast<std::uint64_t>(i) + 1);
+    return testing_world::MakeFrame(i, image);
+  };
+  const Tour tour = TakeFrames(true, kTurned + kCovered + kAgain, frame_at);
+  EXPECT_FALSE(tour.map->HasFinitePoints());
+  for (int i = 1; i < kTurned; ++i) ASSERT_EQ(tour.At(i).state, TrackingState::kPanorama) << i;
+  for (int i = kTurned + kCovered; i < kTurned + kCovered + kAgain; ++i) {
+    EXPECT_TRUE(HasPose(tour.At(i).state)) << i;
+    EXPECT_NEAR(tour.At(i).camera_from_map.rotation.Angle(), Radians(kTurned), Radians(0.5)) << i;
+  }
+}
+
 TEST(HybridTracker, LeavesTheMapWhenAPoseThatWasNotConfirmedSeesNothingOfIt) {
   TrackerOptions options;
   options.confirming_frames = kTourFrames;
