@@ -257,7 +257,13 @@ void Tracker::Use(const std::optional<FoundPose>& found, TrackedFrame* out) {
   if (found->how != FoundPose::How::kNearby) odometry_.Reset();
   const bool entered = found->how == FoundPose::How::kEntered;
   if (entered) {
-    if (found->map_key != map_key_) confirmation_.EnterOtherMap();
+    if (found->map_key != map_key_) {
+      confirmation_.EnterOtherMap();
+      // A pair of views of the map that was left must not start one here.
+      initialization_.Stop();
+      offers_.Withdraw();
+      search_known_maps_ = false;
+    }
     map_ = found->map;
     map_key_ = found->map_key;
     reports_.Clear();

@@ -314,6 +314,37 @@ void CoverTiles(int every, cv::Mat* image) {
   }
 }
 
+// A new map that has no depth yet is left for a known one: the search for its first depth ends with it.
+TEST(Tracker, SearchesNoInitialPairAfterItHasEnteredAKnownMap) {
+  const TrackedWalk& walk = OneWalk();
+  ASSERT_NE(walk.map, nullptr);
+  SomeMaps places;
+  places.Add(9, walk.map);
+  const RenderedWorld other = RenderedWorld::Room(7177);
+  Tracker tracker({}, Camera(), 3);
+  Mapper mapper({});
+  tracker.StartNewMap();
+  int entered = 0;
+  for (int i = 0; i < kFramesOfTheWalk; ++i) {
+    Frame frame = WalkFrame(i);
+    if (i < 10) frame.image = other.Render(*Camera(), WalkPose(0), 1.5, static_cast<std::uint64_t>(i));
+    const TrackedFrame tracked = tracker.Track(frame, &places);
+    if (entered > 0 || (HasPose(tracked.state) && tracked.map_key == 9)) {
+      ++entered;
+      EXPECT_FALSE(tracker.TakeInitialPair()) << i;
+      EXPECT_TRUE(HasPose(tracked.state)) << i;
+      tracker.SetMap(walk.map, 9);
+      continue;
+    }
+    if (auto candidate = tracker.TakeKeyFrameCandidate(); candidate && mapper.Offer(std::move(*candidate)))
+      tracker.KeyFrameAccepted();
+    for (int step = 0; step < 20 && !mapper.IsIdle(); ++step) mapper.Step();
+    mapper.Step();
+    if (mapper.Snapshot()) tracker.SetMap(mapper.Snapshot(), 1);
+  }
+  EXPECT_GT(entered, kFramesOfTheWalk / 2);
+}
+
 TEST(Tracker, KeepsAPoseWithConsensusAlthoughMostPointsAreOccluded) {
   const TrackedWalk& walk = OneWalk();
   ASSERT_NE(walk.map, nullptr);
