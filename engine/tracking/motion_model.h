@@ -2,6 +2,7 @@
 #pragma once
 
 #include <algorithm>
+#include <optional>
 
 #include "engine/base/time.h"
 #include "engine/geometry/rigid3.h"
@@ -16,6 +17,7 @@ class MotionModel {
   void Reset(Timestamp time, const Rigid3& camera_from_map) {
     time_ = time;
     camera_from_map_ = camera_from_map;
+    before_miss_.reset();
     twist_per_second_.setZero();
   }
   void Update(Timestamp time, const Rigid3& camera_from_map) {
@@ -28,9 +30,11 @@ class MotionModel {
     }
     time_ = time;
     camera_from_map_ = camera_from_map;
+    before_miss_.reset();
   }
   // To be called when no pose was found: the velocity is halved.
   void Miss(Timestamp time) {
+    before_miss_ = camera_from_map_;
     camera_from_map_ = Predict(time);
     time_ = time;
     twist_per_second_ *= 0.5;
@@ -45,6 +49,13 @@ class MotionModel {
   Rigid3 PredictWithRotation(const Rotation3& now_from_previous) const {
     return Rigid3(now_from_previous, Eigen::Vector3d::Zero()) * camera_from_map_;
   }
+  // The same for the frame at `time`, of which a prediction may be the last pose already: of a frame without
+  // a pose, or one that was given with Reset.
+  Rigid3 PredictWithRotation(Timestamp time, const Rotation3& now_from_previous) const {
+    if (time_ < time) return PredictWithRotation(now_from_previous);
+    if (!before_miss_) return camera_from_map_;
+    return Rigid3(now_from_previous, Eigen::Vector3d::Zero()) * *before_miss_;
+  }
   // To be called when the mapper has moved this part of the map.
   void ApplyCorrection(const Sim3& after_from_before) {
     camera_from_map_ = CorrectedPose(camera_from_map_, after_from_before);
@@ -58,6 +69,7 @@ class MotionModel {
  private:
   Timestamp time_{};
   Rigid3 camera_from_map_;
+  std::optional<Rigid3> before_miss_;  // the pose before the last frame, if that one has none
   Eigen::Matrix<double, 6, 1> twist_per_second_ = Eigen::Matrix<double, 6, 1>::Zero();
 };
 

@@ -130,7 +130,7 @@ MapTrackResult PoseTracker::TryElsewhere(const MapSnapshot& map, const CameraIma
 
 Rigid3 PoseTracker::PredictAfterLoss(const CameraImage& image) const {
   const auto rotation = image.RotationFromPrevious();
-  return rotation ? motion_.PredictWithRotation(*rotation) : motion_.Predict(image.time);
+  return rotation ? motion_.PredictWithRotation(image.time, *rotation) : motion_.Predict(image.time);
 }
 
 void PoseTracker::MissAt(Timestamp time, const Rigid3& camera_from_map) {

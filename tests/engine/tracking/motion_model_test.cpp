@@ -75,5 +75,25 @@ TEST(MotionModel, RotatesAboutTheCentreWhenOnlyTheRotationIsKnown) {
   EXPECT_LT((predicted.rotation.inverse() * (turn * Screw(0).rotation)).Angle(), 1e-12);
 }
 
+// The frame of a loss has been predicted with the velocity already: the rotation of its image must not be
+// added to that.
+TEST(MotionModel, RotatesThePoseBeforeALossInTheFrameOfTheLoss) {
+  MotionModel model;
+  model.Reset(FromSeconds(0), Screw(0));
+  for (int i = 1; i <= 20; ++i) model.Update(FromSeconds(i / 30.0), Screw(i / 30.0));
+  const Rotation3 turn = Rotation3::Exp({0.1, -0.2, 0.05});
+  const Rotation3 turned = turn * Screw(20 / 30.0).rotation;
+  model.Miss(FromSeconds(21 / 30.0));
+  Rigid3 predicted = model.PredictWithRotation(FromSeconds(21 / 30.0), turn);
+  EXPECT_LT((predicted.OriginInSource() - Screw(20 / 30.0).OriginInSource()).norm(), 1e-9);
+  EXPECT_LT((predicted.rotation.inverse() * turned).Angle(), 1e-9);
+  // What was searched in vain stays the prediction for this frame, and is rotated for the next one.
+  model.Reset(FromSeconds(21 / 30.0), predicted);
+  predicted = model.PredictWithRotation(FromSeconds(21 / 30.0), turn);
+  EXPECT_LT((predicted.rotation.inverse() * turned).Angle(), 1e-9);
+  predicted = model.PredictWithRotation(FromSeconds(22 / 30.0), turn);
+  EXPECT_LT((predicted.rotation.inverse() * (turn * turned)).Angle(), 1e-9);
+}
+
 }  // namespace
 }  // namespace docent::engine
