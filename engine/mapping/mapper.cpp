@@ -3,6 +3,7 @@
 
 #include <time.h>
 
+#include <algorithm>
 #include <optional>
 #include <variant>
 
@@ -63,13 +64,11 @@ void Mapper::HoldKeyFrames() {
 
 void Mapper::RemoveOldTemporaryKeyFrames() {
   Map& map = workspace_.map;
-  std::vector<KeyFrameId> temporary;
-  for (const auto& [id, record] : map.keyframes()) {
-    if (!record.keyframe.fixed) temporary.push_back(id);
-  }
-  if (temporary.size() <= options_.max_temporary_keyframes) return;
-  temporary.resize(temporary.size() - options_.max_temporary_keyframes);
-  for (const KeyFrameId id : temporary) CullKeyFrame(id, &map);
+  auto temporary = static_cast<std::size_t>(
+      std::ranges::count_if(map.keyframes(), [](const auto& entry) { return !entry.second.keyframe.fixed; }));
+  if (temporary <= options_.max_temporary_keyframes) return;
+  for (; temporary > options_.max_temporary_keyframes; --temporary)
+    CullKeyFrame(FindOldestKeyFrame(map), &map);
   workspace_.searcher.Clear();
   output_.Publish(map.Snapshot());
 }

@@ -52,7 +52,7 @@ class Mapper {
  private:
   // Holds the poses of the keyframes that the map has now.
   void HoldKeyFrames();
-  // Removes the oldest temporary keyframes above their largest number.
+  // Removes the oldest temporary keyframes above their largest number (FindOldestKeyFrame).
   void RemoveOldTemporaryKeyFrames();
   // Resets the state of the stepping thread to a map; the queue is not changed.
   void ResumeFrom(const MapSnapshot* snapshot);

@@ -69,6 +69,21 @@ KeyFrameId FindRedundantKeyFrame(const KeyFrameCullingOptions& options, KeyFrame
   return kNoId;
 }
 
+KeyFrameId FindOldestKeyFrame(const Map& map) {
+  const KeyFrame* oldest = nullptr;
+  for (const auto& [id, record] : map.keyframes()) {
+    const KeyFrame& keyframe = record.keyframe;
+    if (keyframe.fixed) continue;
+    if (!oldest) {
+      oldest = &keyframe;
+      if (oldest->kind == KeyFrameKind::kPanorama || oldest->panorama == kNoId) return id;
+    } else if (keyframe.kind == KeyFrameKind::kPanorama && keyframe.panorama == oldest->panorama) {
+      return id;
+    }
+  }
+  return oldest ? oldest->id : kNoId;
+}
+
 void CullKeyFrame(KeyFrameId id, Map* map) {
   const Map::KeyFrameRecord* record = map->FindKeyFrame(id);
   if (!record) return;

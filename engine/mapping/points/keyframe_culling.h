@@ -26,9 +26,14 @@ struct KeyFrameCullingOptions {
 // is still being extended.
 KeyFrameId FindRedundantKeyFrame(const KeyFrameCullingOptions& options, KeyFrameId newest, Map* map);
 
-// Removes a localized keyframe but keeps its points: a point whose source it is gets the observer on the
-// finest level as its new source. Culling keeps the cost of a map proportional to the space that it covers
-// and not to the time spent there.
+// Finds the keyframe with the lowest id that is not fixed; kNoId if all are. A panorama map is lost with its
+// reference, so instead of a reference it returns the first dependent keyframe of that panorama map that is
+// not fixed, if there is one.
+KeyFrameId FindOldestKeyFrame(const Map& map);
+
+// Removes a keyframe but keeps its points: a point whose source it is gets the observer on the finest level
+// as its new source. Culling keeps the cost of a map proportional to the space that it covers and not to the
+// time spent there.
 void CullKeyFrame(KeyFrameId keyframe, Map* map);
 
 }  // namespace docent::engine

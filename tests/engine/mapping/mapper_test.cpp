@@ -304,6 +304,36 @@ TEST_F(MapperTest, KeepsTheAdoptedKeyframesOfATemporaryMapAndTheNewestOfTheOther
   EXPECT_LT(MedianDistanceToSurface(map), 0.02);
 }
 
+// A visitor who turns beyond what the map shows depends on the reference, however many keyframes follow it.
+TEST_F(MapperTest, KeepsThePanoramaOfATemporaryMapWhileTheCameraTurns) {
+  MapperOptions options;
+  options.temporary = true;
+  options.max_temporary_keyframes = 3;
+  Mapper mapper(options);
+  mapper.Adopt(started_);
+  const auto offer = [&](KeyFrameChoice choice, PanoramaId panorama, double turn_deg, double seconds) {
+    KeyFrameCandidate candidate =
+        TrueCandidate(*world_, *started_, CameraAt({0.2, 0, 0}, {0, turn_deg, 0}), seconds);
+    candidate.choice = choice;
+    candidate.panorama = panorama;
+    ASSERT_TRUE(mapper.Offer(candidate));
+    WorkUntilIdle(&mapper);
+    EXPECT_EQ(Validate(*mapper.Snapshot()), "");
+  };
+  offer(KeyFrameChoice::kLocalizedPanorama, kNoId, 0, 1);
+  ASSERT_EQ(mapper.Snapshot()->panoramas.size(), 1u);
+  const PanoramaMap opened = mapper.Snapshot()->panoramas.front();
+  for (int i = 1; i <= 5; ++i) offer(KeyFrameChoice::kPanorama, opened.id, 4.0 * i, 1.0 + i);
+  const MapSnapshot& map = *mapper.Snapshot();
+  ASSERT_EQ(map.panoramas.size(), 1u);
+  EXPECT_EQ(map.panoramas.front().reference, opened.reference);
+  ASSERT_EQ(map.keyframes.size(), started_->keyframes.size() + 3);
+  EXPECT_EQ(map.keyframes[map.keyframes.size() - 3].id, opened.reference);
+  EXPECT_EQ(map.keyframes[map.keyframes.size() - 2].time, FromSeconds(5));
+  EXPECT_EQ(map.keyframes.back().time, FromSeconds(6));
+  EXPECT_TRUE(std::ranges::any_of(map.points, [](const MapPoint& point) { return point.infinite(); }));
+}
+
 TEST_F(MapperTest, RemovesPointsThatTheTrackersReportAsOutliers) {
   Mapper mapper({});
   mapper.Adopt(started_);

@@ -68,6 +68,23 @@ TEST(KeyFrameCulling, KeepsFixedKeyFramesAndReferences) {
   EXPECT_EQ(FindRedundantKeyFrame({}, Newest(map), &map), kNoId);
 }
 
+TEST(KeyFrameCulling, TheOldestKeyFrameIsNoReferenceOfOthers) {
+  Map map = MapWithKeyFramesAt({0, 0.1, 0.2});
+  EXPECT_EQ(FindOldestKeyFrame(map), 1u) << "the first one is fixed";
+  const PanoramaId panorama = map.OpenPanorama(1);
+  EXPECT_EQ(FindOldestKeyFrame(map), 1u) << "no other keyframe needs it";
+  KeyFrame dependent = map.FindKeyFrame(1)->keyframe;
+  dependent.kind = KeyFrameKind::kPanorama;
+  const KeyFrameId first = map.AddKeyFrame(dependent).keyframe.id;
+  map.AddKeyFrame(dependent);
+  ASSERT_EQ(dependent.panorama, panorama);
+  EXPECT_EQ(FindOldestKeyFrame(map), first);
+  map.FindKeyFrame(1)->keyframe.fixed = true;
+  EXPECT_EQ(FindOldestKeyFrame(map), 2u);
+  for (auto& [id, record] : map.keyframes()) record.keyframe.fixed = true;
+  EXPECT_EQ(FindOldestKeyFrame(map), kNoId);
+}
+
 TEST(KeyFrameCulling, KeepsEnoughObserversOfEveryPoint) {
   Map map = MapWithKeyFramesAt({0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0, 1.1});
   const std::size_t points = map.AlivePoints();
