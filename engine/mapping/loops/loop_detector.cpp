@@ -37,9 +37,12 @@ std::vector<LoopCandidate> LoopDetector::Detect(KeyFrameId id, Map* map, PointSe
     return !map->FindKeyFrame(earlier.keyframe) || !map->FindKeyFrame(earlier.place);
   });
   if (!candidates_.empty() && !Agree(candidates_.back(), *candidate, map)) candidates_.clear();
+  // Small disagreements of neighbours add up, or the first candidate was wrong: the series starts later then.
+  candidates_.erase(candidates_.begin(), std::ranges::find_if(candidates_, [&](const LoopCandidate& earlier) {
+                      return Agree(earlier, *candidate, map);
+                    }));
   candidates_.push_back(*candidate);
-  if (candidates_.size() < options_.min_consecutive || !Agree(candidates_.front(), *candidate, map))
-    return {};
+  if (candidates_.size() < options_.min_consecutive) return {};
   return std::exchange(candidates_, {});
 }
 

@@ -52,7 +52,8 @@ class LoopDetector {
 
   const LoopDetectorOptions options_;
   LoopCandidateSearch search_;
-  std::vector<LoopCandidate> candidates_;  // of keyframes in a row
+  // Of keyframes in a row; each agrees with the one before it, and the first one with the last.
+  std::vector<LoopCandidate> candidates_;
 };
 
 }  // namespace docent::engine

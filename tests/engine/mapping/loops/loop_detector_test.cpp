@@ -103,6 +103,21 @@ TEST(LoopDetector, RequiresCandidatesThatAgreeOnTheError) {
   EXPECT_EQ(LoopsOf({14, 15, 18}, &map, tolerant), (Loops{{14, 15, 18}}));
 }
 
+// An adjustment moves the first keyframe alone, so that its candidate implies another error than the others.
+TEST(LoopDetector, LeavesOutAFirstCandidateThatTheNewestContradicts) {
+  Map map = ThereAndBack(SmallDrift());
+  LoopDetector detector({});
+  PointSearcher searcher;
+  EXPECT_TRUE(detector.Detect(14, &map, &searcher).empty());
+  EXPECT_TRUE(detector.Detect(15, &map, &searcher).empty());
+  map.FindKeyFrame(14)->keyframe.camera_from_map.translation.x() += 0.2;
+  EXPECT_TRUE(detector.Detect(16, &map, &searcher).empty());
+  std::vector<KeyFrameId> series;
+  for (const LoopCandidate& candidate : detector.Detect(15, &map, &searcher))
+    series.push_back(candidate.keyframe);
+  EXPECT_EQ(series, (std::vector<KeyFrameId>{15, 16, 15}));
+}
+
 TEST(LoopDetector, IgnoresErrorsThatActiveSearchCopesWith) {
   Map map = ThereAndBack({});
   EXPECT_EQ(LoopsOf(kInOrder, &map), Loops{});
