@@ -2,6 +2,8 @@
 #include "engine/map/map_readout.h"
 
 #include <algorithm>
+#include <array>
+#include <vector>
 
 namespace docent::engine {
 
@@ -10,6 +12,22 @@ namespace {
 // Without a rotation there is nothing to correct: the motion is unknown, or there was none.
 bool IsRotatingImage(const CameraModel& image, const CameraModel& camera) {
   return !image.readout_motion().rotation_rate.isZero(0) && image.HasSameLens(camera);
+}
+
+// The readout time that a joined map has for a lens; empty if no image tells one.
+std::optional<Eigen::Vector2d> ReadoutOfBoth(KeyFrameId first_of_b, const CameraModel& lens, const Map& map) {
+  std::array<const CameraModel*, 2> newest = {nullptr, nullptr};  // of A and of B
+  for (const auto& [id, record] : map.keyframes()) {
+    const CameraModel& image = *record.keyframe.camera;
+    if (IsRotatingImage(image, lens)) newest[id < first_of_b ? 0 : 1] = &image;
+  }
+  for (const CameraModel* const image : newest) {
+    if (image && image->known_readout_s()) return image->readout_motion().readout_s;
+  }
+  for (const CameraModel* const image : newest) {
+    if (image && !image->readout_motion().readout_s.isZero(0)) return image->readout_motion().readout_s;
+  }
+  return std::nullopt;
 }
 
 }  // namespace
@@ -62,6 +80,19 @@ bool SetReadout(const CameraModel& camera, const Eigen::Vector2d& readout_s, Map
     if (record.alive && record.point.infinite()) map->UpdateDirection(&record);
   }
   return true;
+}
+
+void UniteReadouts(KeyFrameId first_of_b, Map* map) {
+  std::vector<std::shared_ptr<const CameraModel>> lenses;
+  for (const auto& [id, record] : map->keyframes()) {
+    const std::shared_ptr<const CameraModel>& image = record.keyframe.camera;
+    const bool known =
+        std::ranges::any_of(lenses, [&](const auto& lens) { return lens->HasSameLens(*image); });
+    if (!known && !image->readout_motion().rotation_rate.isZero(0)) lenses.push_back(image);
+  }
+  for (const auto& lens : lenses) {
+    if (const auto readout_s = ReadoutOfBoth(first_of_b, *lens, *map)) SetReadout(*lens, *readout_s, map);
+  }
 }
 
 }  // namespace docent::engine

@@ -29,4 +29,9 @@ std::shared_ptr<const CameraModel> WithReadoutIn(const Map& map,
 // Poses and finite points follow in the next adjustment. True if something changed.
 bool SetReadout(const CameraModel& camera, const Eigen::Vector2d& readout_s, Map* map);
 
+// The same for all lenses of two maps in one, of which B has the keyframes from first_of_b on. All images of
+// a lens get what a calibration states; otherwise what A tells, or B if A tells none. A readout time of zero
+// tells none, because that of a rolling shutter is zero until it is estimated.
+void UniteReadouts(KeyFrameId first_of_b, Map* map);
+
 }  // namespace docent::engine

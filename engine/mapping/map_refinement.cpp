@@ -12,7 +12,6 @@ namespace docent::engine {
 void MapRefinement::Reset() {
   Forget();
   newest_ = kNoId;
-  known_readouts_.clear();
   global_due_ = culling_due_ = loop_to_adjust_ = false;
   locally_adjusted_ = true;
 }

@@ -26,8 +26,11 @@ class MapRefinement {
                 MapperOutput* output)
       : options_(options), interrupt_(interrupt), workspace_(workspace), output_(output) {}
 
-  // Another map: nothing is due, and no keyframe is the newest.
+  // Another map, or this one joined with another: nothing is due, and no keyframe is the newest. What corners
+  // told of readout times remains.
   void Reset();
+  // Another map: what corners told of readout times is dropped too.
+  void ForgetReadouts() { known_readouts_.clear(); }
   // Drops what refers to keyframes and points of a map that is being replaced.
   void Forget();
   // The keyframe about which the next local tasks are done; kNoId for none.

@@ -75,6 +75,7 @@ void Mapper::RemoveOldTemporaryKeyFrames() {
 
 void Mapper::Adopt(std::shared_ptr<const MapSnapshot> snapshot) {
   ResumeFrom(snapshot.get());
+  refinement_.ForgetReadouts();
   if (options_.temporary) HoldKeyFrames();
   queue_.Clear();
   output_.Publish(std::move(snapshot));

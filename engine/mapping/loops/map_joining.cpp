@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "engine/base/option_check.h"
+#include "engine/map/map_readout.h"
 #include "engine/mapping/bundle/map_adjustment.h"
 
 namespace docent::engine {
@@ -16,6 +17,13 @@ namespace {
 
 // Neighbours of each candidate's keyframe that are searched for duplicate points, as for a loop.
 constexpr std::size_t kJoinNeighbours = 16;
+
+// Both maps in one, with one readout time for all images of a lens.
+Map PutTogether(const MapSnapshot& a, const MapSnapshot& b, JoinedIds* ids) {
+  Map map(SideBySide(a, b, ids));
+  UniteReadouts(ids->first_keyframe, &map);
+  return map;
+}
 
 // Transforms the part of the map that came from B by the similarity.
 void MoveB(const Sim3& a_from_b, KeyFrameId first_of_b, Map* map) {
@@ -158,7 +166,7 @@ MapOverlap CompareMaps(const MapOverlapOptions& options, const MapSnapshot& a, c
   Checked(options);
   if (HaveTooManyIds(a, b)) return {};
   JoinedIds ids;
-  Map map(SideBySide(a, b, &ids));
+  Map map = PutTogether(a, b, &ids);
   return FindOverlap(options, ids.first_keyframe, interrupt, &map);
 }
 
@@ -171,7 +179,7 @@ MapJoinAttempt JoinMaps(const MapJoiningOptions& options, const MapSnapshot& a, 
     return attempt;
   }
   auto joined = std::make_shared<JoinedMap>();
-  Map map(SideBySide(a, b, &joined->ids));
+  Map map = PutTogether(a, b, &joined->ids);
   const KeyFrameId first_of_b = joined->ids.first_keyframe;
   attempt.overlap = FindOverlap(options.overlap, first_of_b, interrupt, &map);
   if (attempt.overlap.outcome != MapOverlap::Outcome::kOverlap) {

@@ -12,8 +12,8 @@
 
 // Joins two maps that show one place (map_overlap.h verifies that they do). Map A keeps its coordinates, its
 // scale and its ids; map B is transformed into them with everything in it, panorama maps and infinite points
-// included. Points that both maps contain are fused, and the joined map is adjusted. Pure functions: any
-// thread, equal input gives an equal result.
+// included. All images of a lens get one readout time (UniteReadouts). Points that both maps contain are
+// fused, and the joined map is adjusted. Pure functions: any thread, equal input gives an equal result.
 namespace docent::engine {
 
 struct MapJoiningOptions {

@@ -101,6 +101,30 @@ TEST(MapReadout, DoesNotReplaceThatOfTheCalibration) {
   EXPECT_EQ(WithReadoutIn(map, image), image);
 }
 
+// The readout times that images of one lens have in A and B once the maps are one.
+std::array<double, 2> United(const std::shared_ptr<const CameraModel>& a,
+                             const std::shared_ptr<const CameraModel>& b) {
+  Map map;
+  const KeyFrameId of_a = AddKeyFrame(a, &map), of_b = AddKeyFrame(b, &map);
+  UniteReadouts(of_b, &map);
+  return {ReadoutOf(of_a, map), ReadoutOf(of_b, map)};
+}
+
+TEST(MapReadout, IsTheSameOnceTwoMapsAreOne) {
+  const auto camera = Camera(500);
+  const auto untold = Image(camera, 0.7, 0), told = Image(camera, 0.4, 0.02),
+             differently = Image(camera, -0.2, 0.03);
+  using Pair = std::array<double, 2>;
+  EXPECT_EQ(United(told, differently), (Pair{0.02, 0.02})) << "that of the first map";
+  EXPECT_EQ(United(told, untold), (Pair{0.02, 0.02}));
+  EXPECT_EQ(United(untold, told), (Pair{0.02, 0.02})) << "the first map tells none";
+  EXPECT_EQ(United(untold, untold), (Pair{0, 0}));
+  EXPECT_EQ(United(told, Image(Camera(600), 0.7, 0.03)), (Pair{0.02, 0.03})) << "they are two lenses";
+  const auto global = std::make_shared<const CameraModel>(camera->WithKnownReadout({0, 0}));
+  EXPECT_EQ(United(Image(global, 0.7, 0), told), (Pair{0, 0})) << "the calibration says so";
+  EXPECT_EQ(United(told, Image(global, 0.7, 0)), (Pair{0, 0})) << "the calibration says so";
+}
+
 TEST(MapReadout, GoesToANewImageOfTheSameLens) {
   const auto camera = Camera(500);
   Map map;

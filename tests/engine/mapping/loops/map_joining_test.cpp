@@ -10,7 +10,9 @@
 #include <string>
 #include <vector>
 
+#include "engine/map/map_readout.h"
 #include "engine/mapping/mapper.h"
+#include "tests/engine/initialization/rolled_scene.h"
 #include "tests/engine/mapping/loops/gallery.h"
 
 // Two cameras go along the gallery, and each maps a part of it. The maps have no error, so the joined map
@@ -226,6 +228,71 @@ TEST(MapJoining, KeepsTheQueueOfTheMapper) {
   EXPECT_EQ(Validate(*grown), "");
   EXPECT_EQ(grown->keyframes.size(), a->keyframes.size() + b->keyframes.size() + 1);
   EXPECT_EQ(grown->keyframes.back().id, a->next_keyframe + b->next_keyframe) << "no id is assigned twice";
+}
+
+// The image of a camera that turned at this rate, radians per second.
+std::shared_ptr<const CameraModel> TurningImage(double rate, double readout_s) {
+  return std::make_shared<CameraModel>(
+      CameraModel::WithReadout(testing_world::GalleryCamera(), {{0, rate, 0}, {0, readout_s}}));
+}
+
+// The same map, whose camera turned meanwhile.
+std::shared_ptr<const MapSnapshot> WithImages(const MapSnapshot& map,
+                                              const std::shared_ptr<const CameraModel>& image) {
+  auto turned = std::make_shared<MapSnapshot>(map);
+  for (KeyFrame& keyframe : turned->keyframes) keyframe.camera = image;
+  return turned;
+}
+
+// Maps a keyframe like the last one of the map, a while later, and adjusts it.
+void AddKeyFrameLike(const KeyFrame& last, const std::shared_ptr<const CameraModel>& image, Mapper* mapper) {
+  KeyFrameCandidate candidate;
+  candidate.time = mapper->Snapshot()->keyframes.back().time + FromSeconds(1);
+  candidate.camera = image;
+  candidate.features = last.features;
+  candidate.camera_from_map = last.camera_from_map;
+  ASSERT_TRUE(mapper->Offer(candidate));
+  for (int step = 0; step < 20 && !mapper->IsIdle(); ++step) mapper->Step();
+  ASSERT_TRUE(mapper->IsIdle());
+}
+
+// Corners before a camera whose readout takes this long.
+TrackedCorners CornersWithReadout(double readout_s) {
+  testing_world::RolledScene scene;
+  scene.camera = *testing_world::GalleryCamera();
+  scene.readout_s.y() = readout_s;
+  return {testing_world::GalleryCamera(), ShowCorners(scene)};
+}
+
+TEST(MapJoining, GivesAllImagesOfALensOneReadoutTime) {
+  // So slow that the readout displaces nothing.
+  const auto a = WithImages(*OverlappingPair().a, TurningImage(0.01, 0.02)),
+             b = WithImages(*OverlappingPair().b, TurningImage(0.01, 0));
+  const MapJoinAttempt attempt = JoinMaps({}, *a, *b, nullptr);
+  ASSERT_NE(attempt.joined, nullptr) << Brief(attempt.overlap);
+  for (const KeyFrame& keyframe : attempt.joined->map->keyframes)
+    EXPECT_EQ(keyframe.camera->readout_motion().readout_s, Eigen::Vector2d(0, 0.02)) << keyframe.id;
+}
+
+// Corners tell a mapper the readout time once; later ones are not asked.
+TEST(MapJoining, KeepsWhatCornersToldOfTheReadoutTime) {
+  const auto image = TurningImage(0.2, 0);
+  const auto a = WithImages(*OverlappingPair().a, image), b = WithImages(*OverlappingPair().b, image);
+  const KeyFrame& last = a->keyframes.back();
+  Mapper mapper({});
+  mapper.Adopt(a);
+  AddKeyFrameLike(last, image, &mapper);
+  ASSERT_TRUE(mapper.Offer(CornersWithReadout(0.02)));
+  mapper.Step();
+  const double told = ReadoutIn(*mapper.Snapshot(), *image)->y();
+  ASSERT_GT(told, 0.01);
+  const MapJoinAttempt attempt = mapper.Join(*b, nullptr);
+  ASSERT_NE(attempt.joined, nullptr) << Brief(attempt.overlap);
+  ASSERT_TRUE(mapper.Offer(CornersWithReadout(0.035)));
+  mapper.Step();
+  AddKeyFrameLike(last, image, &mapper);
+  EXPECT_GT(ReadoutIn(*mapper.Snapshot(), *image)->y(), 0.007);
+  EXPECT_LT(ReadoutIn(*mapper.Snapshot(), *image)->y(), told + 0.004);
 }
 
 TEST(MapJoining, LeavesTheMapOfTheMapperUnchangedIfRejected) {
