@@ -65,11 +65,11 @@ Sim3 CorrectionBetween(const Rigid3& before, const Rigid3& after, double scale) 
   return moved;
 }
 
-// Writes an adjusted problem to the map. All keyframes of the lens get `model`, whose focal length is
-// `focal_ratio` times the previous one.
+// Writes an adjusted problem to the map. All keyframes of the lens get `model`; those of a joined map may
+// have had different ones.
 template <typename HasLens>
 void ApplyToMap(const LensAssembly& assembly, const std::shared_ptr<const CameraModel>& model,
-                double focal_ratio, const HasLens& has_lens, Map* map) {
+                const HasLens& has_lens, Map* map) {
   const PanoramaRegistration registration(*map);
   std::map<KeyFrameId, Rigid3> before;
   std::map<KeyFrameId, std::vector<double>> ratios;
@@ -97,6 +97,7 @@ void ApplyToMap(const LensAssembly& assembly, const std::shared_ptr<const Camera
   for (auto& [id, record] : map->keyframes()) {
     KeyFrame& keyframe = record.keyframe;
     if (!has_lens(keyframe.camera.get())) continue;
+    const double focal_ratio = model->intrinsics().fx / keyframe.camera->intrinsics().fx;
     keyframe.camera = CameraModel::WithMotionOf(*keyframe.camera, model);
     if (keyframe.kind != KeyFrameKind::kPanorama) continue;
     // The observed displacement in pixels corresponds to a smaller angle if the focal length is longer.
@@ -243,17 +244,13 @@ LensEstimation::Progress LensEstimation::Step(PointSearcher* searcher, const std
 LensEstimation::Progress LensEstimation::UpdateMap(std::size_t lens, const std::atomic<bool>* interrupt,
                                                    Map* map) {
   const auto has_lens = [&](const CameraModel* model) { return IsVersionOf(lens, model); };
-  double focal = lenses_[lens].model->intrinsics().fx, before = focal;
-  for (const auto& [id, record] : map->keyframes()) {
-    if (has_lens(record.keyframe.camera.get())) before = record.keyframe.camera->intrinsics().fx;
-  }
   LensAssembly assembly = Assemble(*map, lenses_[lens].model, has_lens);
   SelfCalibrationOptions calibration = options_.calibration;
   calibration.refine_lens = false;
   calibration.interrupt = interrupt;
   const SelfCalibration result = CalibrateBundle(calibration, assembly.unknown, &assembly.problem);
   if (result.outcome == SelfCalibration::Outcome::kInterrupted) return Progress::kStepDone;
-  ApplyToMap(assembly, lenses_[lens].model, focal / before, has_lens, map);
+  ApplyToMap(assembly, lenses_[lens].model, has_lens, map);
   last_ = lens;
   return Progress::kMapChanged;
 }
@@ -312,7 +309,7 @@ LensEstimation::Progress LensEstimation::EstimateLens(std::size_t lens, const st
   if (!changes && !fix) return finish(more_precise ? Progress::kLensUpdated : Progress::kNothing);
   known.model = std::make_shared<const CameraModel>(found);
   versions_[lens].push_back(known.model);
-  ApplyToMap(assembly, known.model, result.focal_px / before, has_lens, map);
+  ApplyToMap(assembly, known.model, has_lens, map);
   if (fix || ++plan.round >= options_.max_rounds) return finish(Progress::kMapChanged);
   for (const auto& [id, record] : map->keyframes()) to_match_.push_back(id);
   return Progress::kMapChanged;

@@ -171,6 +171,36 @@ TEST_F(LensEstimationTest, AdaptsAMapThatWasBuiltWithAnEarlierEstimate) {
   for (const auto& [id, record] : old.keyframes()) EXPECT_EQ(record.keyframe.camera, lens);
 }
 
+// A map was joined with one that had the newest estimate already.
+TEST_F(LensEstimationTest, TurnsEachDependentKeyFrameByItsOwnChangeOfTheLens) {
+  const LensScene scene = MakeLensScene({.field_of_view_deg = 80, .noise_px = 0.3, .from_60_degrees = true});
+  Map map = MapOf(scene), joined = map;
+  LensEstimation estimation(OptionsFor(scene));
+  Finish(&estimation, &map);
+  const auto before = scene.problem.cameras[0].model, lens = estimation.lenses()[0].model;
+  const Eigen::Vector3d turn(0.1, -0.2, 0.05);
+  const auto add_dependent = [&](KeyFrameId reference, const std::shared_ptr<const CameraModel>& camera) {
+    KeyFrame dependent = joined.FindKeyFrame(reference)->keyframe;
+    dependent.kind = KeyFrameKind::kPanorama;
+    dependent.panorama = joined.OpenPanorama(reference);
+    dependent.camera = camera;
+    dependent.camera_from_map =
+        Rigid3(Rotation3::Exp(turn), Eigen::Vector3d::Zero()) * dependent.camera_from_map;
+    return joined.AddKeyFrame(dependent).keyframe.id;
+  };
+  const KeyFrameId old = add_dependent(1, before), current = add_dependent(2, lens);
+  estimation.Reset();
+  ASSERT_EQ(estimation.Step(&searcher_, nullptr, &joined), Progress::kMapChanged);
+  const auto turn_of = [&](KeyFrameId dependent, KeyFrameId reference) {
+    const Rotation3& from = joined.FindKeyFrame(reference)->keyframe.camera_from_map.rotation;
+    return (joined.FindKeyFrame(dependent)->keyframe.camera_from_map.rotation * from.inverse()).Log();
+  };
+  const double ratio = lens->intrinsics().fx / before->intrinsics().fx;
+  ASSERT_LT(ratio, 0.8);
+  EXPECT_LT((turn_of(old, 1) - Eigen::Vector3d(0.1 / ratio, -0.2 / ratio, 0.05)).norm(), 1e-6);
+  EXPECT_LT((turn_of(current, 2) - turn).norm(), 1e-6);
+}
+
 TEST_F(LensEstimationTest, ChangesNothingIfTheFocalLengthIsUndetermined) {
   const LensScene scene =
       MakeLensScene({.field_of_view_deg = 80, .noise_px = 0.5, .plane = true, .rotation = 0});
