@@ -97,24 +97,33 @@ DepthEstimator::DepthEstimator(std::shared_ptr<const MapSnapshot> map, const Dep
     : map_(std::move(map)), options_(Checked(options)), views_(ChooseDepthViews(*map_, options.views)) {}
 
 std::shared_ptr<const LevelRays> DepthEstimator::RaysOf(const KeyFrame& keyframe) {
-  for (const auto& [camera, rays] : rays_) {
-    if (camera == *keyframe.camera) return rays;
+  const CameraModel& camera = *keyframe.camera;
+  for (const auto& [known, rays] : rays_) {
+    if (known == camera) return rays;
   }
-  const int level = LevelFor(*keyframe.camera, options_.max_width_px);
-  rays_.emplace_back(*keyframe.camera, std::make_shared<LevelRays>(*keyframe.camera, level));
-  return rays_.back().second;
+  // Each image of a turning rolling shutter has rays of its own, which would take more memory than its depth.
+  const auto storage =
+      camera == camera.WithoutMotion() ? LevelRays::Storage::kStored : LevelRays::Storage::kComputed;
+  auto rays = std::make_shared<const LevelRays>(camera, LevelFor(camera, options_.max_width_px), storage);
+  if (rays->is_stored()) rays_.emplace_back(camera, rays);
+  return rays;
 }
 
 std::optional<DepthMap> DepthEstimator::Estimate(const DepthViews& views,
                                                  const std::atomic<bool>* interrupt) {
+  std::vector<std::shared_ptr<const LevelRays>> rays;  // Of the reference, then of its neighbours.
   const auto view_of = [&](KeyFrameId id) {
     const KeyFrame& keyframe = *map_->FindKeyFrame(id);
     keyframe.features->MarkInUse();
-    const std::shared_ptr<const LevelRays> rays = RaysOf(keyframe);
-    const cv::Mat& image = keyframe.features->levels[static_cast<std::size_t>(rays->level())];
-    return SweepView{&image, rays.get(), keyframe.camera_from_map};
+    rays.push_back(RaysOf(keyframe));
+    const LevelRays& own = *rays.back();
+    const cv::Mat& image = keyframe.features->levels[static_cast<std::size_t>(own.level())];
+    return SweepView{&image, &own, keyframe.camera_from_map};
   };
-  const SweepView reference = view_of(views.keyframe);
+  SweepView reference = view_of(views.keyframe);
+  std::optional<LevelRays> stored;  // The sweep reads each ray of the reference with every plane.
+  if (!reference.rays->is_stored())
+    reference.rays = &stored.emplace(*map_->FindKeyFrame(views.keyframe)->camera, reference.rays->level());
   std::vector<SweepView> neighbours;
   for (const KeyFrameId id : views.neighbours) neighbours.push_back(view_of(id));
   const SweepPlanes planes = SpacePlanes(reference, neighbours, views.min_inverse_distance,
@@ -126,14 +135,14 @@ std::optional<DepthMap> DepthEstimator::Estimate(const DepthViews& views,
   DepthMap depth;
   depth.keyframe = views.keyframe;
   depth.camera_from_map = reference.camera_from_map;
-  depth.rays = RaysOf(*map_->FindKeyFrame(views.keyframe));
+  depth.rays = rays.front();
   depth.step = planes.step;
   depth.confidence = std::move(choice.confidence);
   depth.inverse_distance = cv::Mat::zeros(choice.plane.size(), CV_32FC1);
   for (int y = 0; y < choice.plane.rows; ++y) {
     for (int x = 0; x < choice.plane.cols; ++x) {
       std::uint8_t& confidence = depth.confidence.at<std::uint8_t>(y, x);
-      if (confidence < options_.min_confidence || depth.rays->At(x, y).isZero()) {
+      if (confidence < options_.min_confidence || reference.rays->At(x, y).isZero()) {
         confidence = 0;
       } else {
         depth.inverse_distance.at<float>(y, x) =

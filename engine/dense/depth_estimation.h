@@ -52,7 +52,8 @@ class DepthEstimator {
   std::shared_ptr<const MapSnapshot> map_;
   DepthOptions options_;
   std::vector<DepthViews> views_;
-  std::vector<std::pair<CameraModel, std::shared_ptr<const LevelRays>>> rays_;  // One for each camera.
+  // One for each camera; none for images that a rolling shutter exposed while the camera turned.
+  std::vector<std::pair<CameraModel, std::shared_ptr<const LevelRays>>> rays_;
 };
 
 }  // namespace docent::engine

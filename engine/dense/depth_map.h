@@ -15,20 +15,27 @@ namespace docent::engine {
 // The rays of the pixels of one pyramid level of a camera, for any lens model. Immutable; any thread.
 class LevelRays {
  public:
-  LevelRays(const CameraModel& camera, int level);
+  // Whether the rays take memory, 12 bytes a pixel, or are computed whenever At() asks for one. They are
+  // equal.
+  enum class Storage { kStored, kComputed };
+  LevelRays(const CameraModel& camera, int level, Storage storage = Storage::kStored);
 
   int width_px() const { return width_px_; }    // of the level
   int height_px() const { return height_px_; }  // of the level
   int level() const { return level_; }
   // Unit length in the camera frame; zero if the lens has no ray for the pixel.
-  const Eigen::Vector3f& At(int x, int y) const {
+  Eigen::Vector3f At(int x, int y) const {
+    if (!is_stored()) return Compute(x, y);
     return rays_[static_cast<std::size_t>(y) * static_cast<std::size_t>(width_px_) +
                  static_cast<std::size_t>(x)];
   }
+  bool is_stored() const { return !rays_.empty(); }
   // The pixel of the level at which a point in the camera frame is seen; empty if outside the image.
   std::optional<Eigen::Vector2d> Project(const Eigen::Vector3d& point_in_camera) const;
 
  private:
+  Eigen::Vector3f Compute(int x, int y) const;
+
   CameraModel camera_;
   int level_, width_px_, height_px_;
   std::vector<Eigen::Vector3f> rays_;

@@ -48,7 +48,7 @@ void ProjectPlane(const SweepView& reference, const SweepView& neighbour, double
   std::size_t i = 0;
   for (int y = 0; y < rays.height_px(); ++y) {
     for (int x = 0; x < rays.width_px(); ++x, ++i) {
-      const Eigen::Vector3f& ray = rays.At(x, y);
+      const Eigen::Vector3f ray = rays.At(x, y);
       if (ray.isZero()) continue;
       const auto pixel = neighbour.rays->Project(rotation * ray.cast<double>() + shift);
       if (!pixel) continue;

@@ -7,6 +7,7 @@
 #include <cmath>
 #include <memory>
 #include <opencv2/core.hpp>
+#include <utility>
 #include <vector>
 
 #include "engine/base/error.h"
@@ -187,6 +188,23 @@ TEST(DepthEstimation, GivesTheSameResultEachTime) {
   ASSERT_FALSE(first.views().empty());
   const DepthMap a = *first.Estimate(first.views()[0]), b = *second.Estimate(second.views()[0]);
   EXPECT_EQ(cv::countNonZero(a.inverse_distance != b.inverse_distance), 0);
+}
+
+TEST(DepthEstimation, StoresTheRaysOfCamerasAndNotOfTheImagesOfATurningOne) {
+  const auto camera = testing_world::PinholeCamera(160, 120);
+  for (const double rate : {0.0, 1.0}) {
+    const auto image =
+        std::make_shared<CameraModel>(CameraModel::WithReadout(camera, {{0, rate, 0}, {0, 0.02}}));
+    DepthEstimator estimator(MapOf(image));
+    ASSERT_FALSE(estimator.views().empty());
+    const DepthMap depth = *estimator.Estimate(estimator.views()[0]);
+    EXPECT_EQ(depth.rays->is_stored(), rate == 0);
+    EXPECT_EQ(depth.rays.use_count(), rate == 0 ? 2 : 1) << "the estimator keeps those of the camera";
+    const LevelRays stored(*image, depth.rays->level());
+    ASSERT_TRUE(stored.is_stored());
+    for (const auto& [x, y] : {std::pair{0, 0}, {159, 3}, {80, 119}})
+      EXPECT_EQ(depth.rays->At(x, y), stored.At(x, y)) << x << ' ' << y;
+  }
 }
 
 TEST(DepthEstimation, StopsWhenAsked) {
