@@ -87,7 +87,7 @@ std::optional<std::string> DepthOptions::Validate() const {
       .AtLeast(max_width_px, 1, "largest width")
       .Within(max_planes, 16, 1024, "number of planes")
       .Within(min_confidence, 0, 255, "smallest confidence")
-      .Within(min_agreeing, 0, 16, "number of depths that agree")
+      .Within(min_agreeing, 1, 16, "number of depths that agree")
       .Ratio(agreement, "agreement of depths")
       .AtLeast(min_region_px, 0, "size of the smallest region")
       .fault();

@@ -219,6 +219,11 @@ TEST(DepthEstimation, RefusesOptionsOutOfRange) {
   EXPECT_FALSE(options.Validate());
   options.agreement = -1;
   EXPECT_THROW(DepthEstimator(std::make_shared<MapSnapshot>(), options), Error);
+  options = {};
+  options.min_agreeing = 0;
+  EXPECT_TRUE(options.Validate()) << "a depth that nothing confirms is never kept";
+  options.min_agreeing = 1;
+  EXPECT_FALSE(options.Validate());
 }
 
 TEST(DepthViews, AreLeftOutWithoutParallax) {
