@@ -52,7 +52,9 @@ bool LocalizePanoramaKeyFrame(const LocalizationOptions& options, KeyFrameId key
                               Map* map, PointSearcher* searcher, const Rigid3* guess = nullptr);
 
 // Removes observations of infinite points of a panorama map whose ray deviates from the direction of the
-// point, which is the mean of all its observations. Returns the number removed.
+// point, and updates the directions of these points. Returns the number removed. A direction is that of the
+// ray that created the point, or the mean of the observations at its last update (Map::UpdateDirection),
+// which follows a movement of the panorama map: an observation that is only added does not change it.
 int RemoveInfiniteOutliers(PanoramaId panorama, Map* map);
 
 // Removes infinite points of a localized keyframe that coincide in the image with a finite point. Returns the
