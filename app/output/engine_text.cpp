@@ -213,8 +213,6 @@ std::string TextOf(engine::JoinRefusal refusal, const engine::MapOverlap& overla
       return ReasonOf(overlap);
     case JoinRefusal::kTooMuchDrift:
       return "one map would have to be bent too far to fit the other";
-    case JoinRefusal::kNotAdjustable:
-      return "the joined map cannot be adjusted";
     case JoinRefusal::kInterrupted:
       return "the joining was interrupted";
   }

@@ -58,6 +58,7 @@ struct BundleOptions {
 
 // The result of an adjustment as figures, for logs and decisions.
 struct BundleSummary {
+  // kFailed: nothing was adjusted, because the keyframe in question does not exist (AdjustLocally).
   enum class Outcome { kConverged, kIterationLimit, kInterrupted, kFailed };
   Outcome outcome = Outcome::kFailed;
   // Half the sum of the robust losses of all measurements. Both costs use the threshold that was reached
@@ -72,8 +73,8 @@ struct BundleSummary {
 // Adjusts the free cameras and points in place. At least one camera should be fixed, and a second camera or a
 // point to fix the scale; otherwise only the damping of Levenberg-Marquardt fixes the gauge. A measurement
 // counts as an outlier if its point is behind the camera, or if its point or camera is not finite (such a
-// camera or point is left unchanged). Indices must be valid and models not null. Single-threaded and
-// deterministic: equal input gives an equal result.
+// camera or point is left unchanged). It never fails: what it cannot improve stays as it is. Indices must be
+// valid and models not null. Single-threaded and deterministic: equal input gives an equal result.
 BundleSummary AdjustBundle(const BundleOptions& options, BundleProblem* problem);
 
 }  // namespace docent::engine

@@ -54,7 +54,6 @@ void KeepScale(Map* map, MapAssembly* assembly) {
 
 BundleSummary Solve(const BundleOptions& options, MapAssembly* assembly, Map* map) {
   const BundleSummary summary = AdjustBundle(options, &assembly->problem);
-  if (summary.outcome == BundleSummary::Outcome::kFailed) return summary;
   KeepScale(map, assembly);
   const PanoramaRegistration registration(*map);
   for (std::size_t i = 0; i < assembly->cameras.size(); ++i) {

@@ -65,18 +65,17 @@ void KeepIdsOfA(MapPointId first_of_b, std::vector<LoopCandidate>* candidates) {
 }
 
 // The remaining error at the seam takes several adjustments: rounds with Huber's loss while the cost
-// decreases considerably, then one with the standard loss. Returns false if the adjustment fails.
-bool Adjust(const MapJoiningOptions& options, const std::atomic<bool>* interrupt, Map* map) {
+// decreases considerably, then one with the standard loss.
+void Adjust(const MapJoiningOptions& options, const std::atomic<bool>* interrupt, Map* map) {
   MapAdjustmentOptions adjustment;
   adjustment.global_iterations = options.global_iterations;
   adjustment.global_loss = RobustLoss::kHuber;
   for (int round = 0; round < options.max_rounds; ++round) {
     const BundleSummary summary = AdjustGlobally(adjustment, interrupt, map);
-    if (summary.outcome == BundleSummary::Outcome::kFailed) return false;
     if (summary.final_cost >= options.max_cost_ratio * summary.initial_cost) break;
   }
   adjustment.global_loss = RobustLoss::kTukey;
-  return AdjustGlobally(adjustment, interrupt, map).outcome != BundleSummary::Outcome::kFailed;
+  AdjustGlobally(adjustment, interrupt, map);
 }
 
 // Fuses pairs of points that the two maps have of one physical point; returns the number of pairs. Duplicates
@@ -198,10 +197,7 @@ MapJoinAttempt JoinMaps(const MapJoiningOptions& options, const MapSnapshot& a, 
   }
   KeepIdsOfA(joined->ids.first_point, &candidates);
   joined->points_merged = FuseDuplicatePoints(joined->ids, candidates, interrupt, &map);
-  if (!Adjust(options, interrupt, &map)) {
-    attempt.refusal = JoinRefusal::kNotAdjustable;
-    return attempt;
-  }
+  Adjust(options, interrupt, &map);
   if (interrupt && *interrupt) {
     attempt.refusal = JoinRefusal::kInterrupted;
     return attempt;

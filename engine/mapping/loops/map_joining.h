@@ -48,11 +48,10 @@ struct JoinedMap {
 
 // Why two maps were not joined.
 enum class JoinRefusal : std::uint8_t {
-  kNone,           // they were joined
-  kTooManyIds,     // together they have more ids than one map can hold
-  kNoOverlap,      // see MapOverlap::outcome
-  kTooMuchDrift,   // the pose graph of one map does not fit the other
-  kNotAdjustable,  // the adjustment of the joined map failed
+  kNone,          // they were joined
+  kTooManyIds,    // together they have more ids than one map can hold
+  kNoOverlap,     // see MapOverlap::outcome
+  kTooMuchDrift,  // the pose graph of one map does not fit the other
   kInterrupted,
 };
 
