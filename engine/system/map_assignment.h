@@ -51,6 +51,8 @@ class MapAssignment {
   bool has_order() const { return order_ != Order::kNone; }
   // It searches the initial views of the map, from the start until the map has finite points.
   bool is_starting() const { return starting_; }
+  // Of the maps that were started, it started the last one.
+  bool started_map() const { return started_map_; }
   std::optional<Timestamp> lost_since() const { return lost_since_; }  // while it is lost in the map
   bool IsLostFor(Timestamp duration, Timestamp now) const {
     return lost_since_ && now - *lost_since_ > duration;
@@ -60,7 +62,7 @@ class MapAssignment {
   std::uint64_t map_ = 0;
   Order order_ = Order::kNone;
   bool starting_ = false;
-  bool started_map_ = false;  // of the maps that were started, this camera started the last one
+  bool started_map_ = false;
   std::optional<Timestamp> lost_since_;
 };
 

@@ -11,7 +11,7 @@ struct MapPermissions {
   bool extend = true;                         // keyframes may be added, and the map adjusted
   std::optional<Eigen::AlignedBox3d> bounds;  // new keyframes only with their centre inside; map frame
   bool join = true;                           // may be joined with another map
-  bool discard = true;                        // may be discarded while it is provisional
+  bool discard = true;                        // may be discarded while it is provisional or has no depth
 };
 
 }  // namespace docent::engine

@@ -30,7 +30,7 @@ void MapPolicy::HandleResult(std::size_t index, TrackedFrame* frame) {
     camera->assignment.SetLost(now);
   }
   // With several cameras, one that is tracked shows that the initialization holds.
-  if (has_pose || !state_.association.AnyTracked()) CheckProvisionalMap(*camera, *frame);
+  if (has_pose || !state_.association.AnyTracked()) CheckProvisionalMap(index, *frame);
   if (!has_pose) CheckLoss(index, *frame);
 }
 
@@ -83,18 +83,19 @@ void MapPolicy::LeavePreviousMap(std::uint64_t previous, std::uint64_t entered, 
   state_.Emit(time, previous, event);
 }
 
-void MapPolicy::CheckProvisionalMap(const SystemCamera& camera, const TrackedFrame& frame) {
-  const auto found = state_.maps.find(camera.assignment.map());
+void MapPolicy::CheckProvisionalMap(std::size_t index, const TrackedFrame& frame) {
+  const MapAssignment& assignment = state_.cameras[index].assignment;
+  const auto found = state_.maps.find(assignment.map());
   if (found == state_.maps.end()) return;
   KnownMap& map = found->second;
-  const auto reason =
-      map.provisional.Check(options_.provisional, {.frame = frame,
-                                                   .in_map = frame.map_key == map.key,
-                                                   .map = map.snapshot.get(),
-                                                   .lost_since = camera.assignment.lost_since(),
-                                                   .may_extend = options_.extend_maps,
-                                                   .may_discard = map.permissions.discard});
-  if (reason) Discard(map.key, frame.frame.time, *reason);
+  const auto reason = map.provisional.Check(options_.provisional,
+                                            {.frame = frame,
+                                             .in_map = frame.map_key == map.key,
+                                             .map = map.snapshot.get(),
+                                             .lost_since = assignment.lost_since(),
+                                             .may_extend = options_.extend_maps,
+                                             .may_discard = map.started_here && map.permissions.discard});
+  if (reason) Discard(index, frame.frame.time, *reason);
 }
 
 // Starts a new map for a camera that is lost and recognizes no map.
@@ -117,20 +118,33 @@ void MapPolicy::CheckLoss(std::size_t index, const TrackedFrame& frame) {
   StartMap(key, index, true);
 }
 
-void MapPolicy::Discard(std::uint64_t key, Timestamp time, MapDiscarded event) {
+void MapPolicy::Discard(std::size_t index, Timestamp time, MapDiscarded event) {
+  const std::uint64_t key = state_.cameras[index].assignment.map();
   KnownMap& map = state_.maps.at(key);
   const std::uint64_t next_key = NewKey();
   if (next_key == 0) return;
   map.discarded = true;
   index_.RemoveMap(key);
   KnownMap& next = state_.AddMap(next_key);
+  next.started_here = true;
   next.after_loss = map.after_loss;
   event.replacement = next.key;
   state_.Emit(time, key, event);
   AssignMapper(next.key, nullptr);
   state_.association.Begin(next.key);
-  for (SystemCamera& camera : state_.cameras) {
-    if (camera.assignment.map() == key) camera.assignment.Replace(next.key, next.after_loss);
+  // Until the next map has a pose, no camera may search another one: one of them must start it.
+  const bool has_starter =
+      std::any_of(state_.cameras.begin(), state_.cameras.end(), [key](const SystemCamera& camera) {
+        return camera.assignment.map() == key && camera.assignment.started_map();
+      });
+  for (std::size_t i = 0; i < state_.cameras.size(); ++i) {
+    MapAssignment& assignment = state_.cameras[i].assignment;
+    if (assignment.map() != key) continue;
+    if (i == index && !has_starter) {
+      assignment.Start(next.key, next.after_loss);
+    } else {
+      assignment.Replace(next.key, next.after_loss);
+    }
   }
 }
 
@@ -165,6 +179,7 @@ void MapPolicy::StartMap(std::uint64_t key, std::size_t camera, bool after_loss)
   const std::uint64_t previous = state_.active_key;
   if (previous != 0) LeaveMap(previous);
   KnownMap& map = state_.AddMap(key);
+  map.started_here = true;
   if (after_loss) map.after_loss = true;
   Activate(map);
   for (std::size_t i = 0; i < state_.cameras.size(); ++i) {

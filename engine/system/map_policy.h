@@ -47,11 +47,12 @@ class MapPolicy {
 
  private:
   void RejectPose(std::size_t index, TrackedFrame* frame);
-  void CheckProvisionalMap(const SystemCamera& camera, const TrackedFrame& frame);
+  void CheckProvisionalMap(std::size_t index, const TrackedFrame& frame);
   void CheckLoss(std::size_t index, const TrackedFrame& frame);
   void EnterTrackedMap(std::size_t index, std::uint64_t key, Timestamp time);
   void LeavePreviousMap(std::uint64_t previous, std::uint64_t entered, Timestamp time);
-  void Discard(std::uint64_t key, Timestamp time, MapDiscarded event);
+  // Discards the map of this camera, and starts another one instead.
+  void Discard(std::size_t index, Timestamp time, MapDiscarded event);
   void AssignMapper(std::uint64_t key, std::shared_ptr<const MapSnapshot> snapshot);
   std::uint64_t NewKey() const;  // 0 if there is none now
 

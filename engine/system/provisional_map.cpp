@@ -30,6 +30,10 @@ std::optional<MapDiscarded> ProvisionalMap::Check(const ProvisionalMapOptions& o
   if (seen.may_extend && seen.map && !seen.map->HasFinitePoints()) {
     // A map without finite points is quickly made again.
     if (!is_lost_for(options.panorama_loss_time)) return std::nullopt;
+    if (!seen.may_discard) {
+      pending_ = false;
+      return std::nullopt;
+    }
     reason.reason = MapDiscarded::Reason::kLostWithoutDepth;
     return reason;
   }

@@ -36,6 +36,7 @@ struct KnownMap {
   std::shared_ptr<const MapSnapshot> snapshot;  // null while initialization is pending, or not in memory
   MapPermissions permissions;
   ProvisionalMap provisional;  // pending for a map that was started here until its depth is confirmed
+  bool started_here = false;   // by a camera, and not added by the application
   bool discarded = false;
   bool after_loss = false;        // started because the camera was lost in another map
   std::uint64_t join_with = 0;    // the map that this one is to be joined into if they overlap; 0 for none

@@ -121,6 +121,13 @@ TEST_F(NewMap, WithoutDepthIsDiscardedAfterAShortLoss) {
   EXPECT_EQ(discarded->reason, Reason::kLostWithoutDepth);
 }
 
+TEST_F(NewMap, WithoutDepthIsKeptWhenItMayNotBeDiscarded) {
+  map_->points.clear();
+  may_discard_ = false;
+  EXPECT_FALSE(Lose(2.2, 2));
+  EXPECT_FALSE(provisional_.is_pending()) << "a lost camera would not start another map";
+}
+
 TEST(ProvisionalMapOptions, AreRefusedOutOfRange) {
   ProvisionalMapOptions options;
   EXPECT_FALSE(options.Validate());

@@ -1,0 +1,96 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "engine/system/map_policy.h"
+
+#include <gtest/gtest.h>
+
+#include <memory>
+
+#include "tests/engine/mapping/panorama/panorama_scene.h"
+
+namespace docent::engine {
+namespace {
+
+using Order = MapAssignment::Order;
+
+std::shared_ptr<const MapSnapshot> MapWithoutDepth() {
+  Map map;
+  map.AddKeyFrame(testing_world::BlankKeyFrame());
+  map.OpenPanorama(0);
+  return map.Snapshot();
+}
+
+// Two cameras of one wearer, without images: the tests say what the trackers find.
+class PolicyForTwoCameras : public ::testing::Test {
+ protected:
+  PolicyForTwoCameras() { state_.cameras.resize(2); }
+
+  MapAssignment& Assignment(std::size_t camera) { return state_.cameras[camera].assignment; }
+  KnownMap& MapOf(std::uint64_t key) { return state_.maps.at(key); }
+  // The order that the camera receives with its next frame.
+  Order NextOrder(std::size_t camera) {
+    const KnownMap* const map = state_.FindMap(Assignment(camera).map());
+    return Assignment(camera).TakeOrder(map != nullptr && map->snapshot && map->snapshot->HasFinitePoints());
+  }
+  // The camera is lost in a frame.
+  void Lose(std::size_t camera, double seconds) {
+    TrackedFrame frame;
+    frame.frame.time = FromSeconds(seconds);
+    frame.state = TrackingState::kLost;
+    policy_.HandleResult(camera, &frame);
+  }
+  // The application adds a panorama map, and both cameras search it.
+  void EnterMapWithoutDepth(std::uint64_t key) {
+    state_.AddMap(key).snapshot = MapWithoutDepth();
+    policy_.EnterMap(key, 0);
+    for (const std::size_t camera : {0, 1}) EXPECT_EQ(NextOrder(camera), Order::kEnter);
+  }
+
+  SystemOptions options_;
+  SystemState state_{2};
+  CameraCalibrations calibrations_{&state_};
+  PlaceIndex index_;
+  MappingThread mapping_{MapperOptions(), /*threaded=*/false, [](const MappingThread::MapperUpdate&) {}};
+  MapPolicy policy_{options_, &state_, &calibrations_, &index_, &mapping_};
+};
+
+TEST_F(PolicyForTwoCameras, ReplacesAMapWithoutDepthThatACameraStarted) {
+  policy_.StartMap(1, 1, false);
+  for (const std::size_t camera : {0, 1}) NextOrder(camera);
+  MapOf(1).snapshot = MapWithoutDepth();
+  Lose(0, 2);
+  Lose(0, 2.2);
+  EXPECT_TRUE(MapOf(1).discarded);
+  EXPECT_EQ(state_.active_key, 2u);
+  EXPECT_EQ(NextOrder(0), Order::kEnter);
+  EXPECT_EQ(NextOrder(1), Order::kStart);
+}
+
+TEST_F(PolicyForTwoCameras, KeepsAMapWithoutDepthThatNoCameraStarted) {
+  EnterMapWithoutDepth(1);
+  for (const double seconds : {2.0, 2.2, 9.0}) Lose(0, seconds);
+  EXPECT_TRUE(MapOf(1).Exists());
+  EXPECT_EQ(state_.maps.size(), 1u);
+  EXPECT_EQ(state_.association.SearchedMap(), 0u) << "the cameras may search every map";
+}
+
+TEST_F(PolicyForTwoCameras, KeepsAMapWithoutDepthThatMayNotBeDiscarded) {
+  policy_.StartMap(1, 0, false);
+  for (const std::size_t camera : {0, 1}) NextOrder(camera);
+  MapOf(1).snapshot = MapWithoutDepth();
+  MapOf(1).permissions.discard = false;
+  for (const double seconds : {2.0, 2.2, 9.0}) Lose(0, seconds);
+  EXPECT_TRUE(MapOf(1).Exists());
+}
+
+TEST_F(PolicyForTwoCameras, LetsTheLostCameraStartAReplacementThatNoOtherStarts) {
+  EnterMapWithoutDepth(1);
+  MapOf(1).started_here = true;
+  Lose(1, 2);
+  Lose(1, 2.2);
+  EXPECT_TRUE(MapOf(1).discarded);
+  EXPECT_EQ(NextOrder(0), Order::kEnter);
+  EXPECT_EQ(NextOrder(1), Order::kStart);
+}
+
+}  // namespace
+}  // namespace docent::engine
