@@ -9,14 +9,17 @@ namespace docent::engine {
 void MapPolicy::HandleResult(std::size_t index, TrackedFrame* frame) {
   SystemCamera* const camera = &state_.cameras[index];
   const Timestamp now = camera->last_time = frame->frame.time;
+  // The frame began before the order, so that its pose or its loss is not one in the map that was ordered.
+  const bool is_outdated = camera->assignment.has_order();
   if (!HasPose(frame->state)) {
     state_.association.SetLost(index);
   } else if (const auto map = state_.maps.find(frame->map_key);
-             camera->assignment.has_order() || map == state_.maps.end() || !map->second.Exists() ||
+             is_outdated || map == state_.maps.end() || !map->second.Exists() ||
              !state_.association.SetTracked(index, frame->map_key)) {
     state_.association.SetLost(index);
     RejectPose(index, frame);
   }
+  if (is_outdated) return;
   const bool has_pose = HasPose(frame->state);
   if (has_pose && frame->map_key != camera->assignment.map()) {
     EnterTrackedMap(index, frame->map_key, now);

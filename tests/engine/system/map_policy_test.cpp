@@ -12,6 +12,12 @@ namespace {
 
 using Order = MapAssignment::Order;
 
+std::shared_ptr<const MapSnapshot> MapWithAPoint() {
+  auto map = std::make_shared<MapSnapshot>();
+  map->points.emplace_back();
+  return map;
+}
+
 std::shared_ptr<const MapSnapshot> MapWithoutDepth() {
   Map map;
   map.AddKeyFrame(testing_world::BlankKeyFrame());
@@ -31,12 +37,23 @@ class PolicyForTwoCameras : public ::testing::Test {
     const KnownMap* const map = state_.FindMap(Assignment(camera).map());
     return Assignment(camera).TakeOrder(map != nullptr && map->snapshot && map->snapshot->HasFinitePoints());
   }
-  // The camera is lost in a frame.
-  void Lose(std::size_t camera, double seconds) {
+  // A frame of the camera ends in this state.
+  TrackedFrame Handle(std::size_t camera, double seconds, TrackingState state, bool left_map = false) {
     TrackedFrame frame;
     frame.frame.time = FromSeconds(seconds);
-    frame.state = TrackingState::kLost;
+    frame.state = state;
+    frame.left_map = left_map;
+    frame.map_key = HasPose(state) ? 1 : 0;
     policy_.HandleResult(camera, &frame);
+    return frame;
+  }
+  void Lose(std::size_t camera, double seconds) { Handle(camera, seconds, TrackingState::kLost); }
+  // A camera started map 1, both are in it, and lost since this time.
+  void LoseMapWithAPoint(double seconds) {
+    policy_.StartMap(1, 0, false);
+    for (const std::size_t camera : {0, 1}) NextOrder(camera);
+    MapOf(1).snapshot = MapWithAPoint();
+    for (const std::size_t camera : {0, 1}) Lose(camera, seconds);
   }
   // The application adds a panorama map, and both cameras search it.
   void EnterMapWithoutDepth(std::uint64_t key) {
@@ -90,6 +107,37 @@ TEST_F(PolicyForTwoCameras, LetsTheLostCameraStartAReplacementThatNoOtherStarts)
   EXPECT_TRUE(MapOf(1).discarded);
   EXPECT_EQ(NextOrder(0), Order::kEnter);
   EXPECT_EQ(NextOrder(1), Order::kStart);
+}
+
+TEST_F(PolicyForTwoCameras, StartsOneMapAfterALossWhileTheOtherCameraProcessesAFrame) {
+  options_.new_map_when_lost = true;
+  LoseMapWithAPoint(2);
+  Lose(0, 2.25);
+  ASSERT_EQ(state_.active_key, 2u);
+  Lose(1, 2.26);  // in the first map
+  EXPECT_FALSE(Assignment(1).lost_since());
+  EXPECT_EQ(NextOrder(0), Order::kStartAfterLoss);
+  EXPECT_EQ(NextOrder(1), Order::kEnter);
+  for (const double seconds : {2.3, 2.5, 2.9}) {
+    for (const std::size_t camera : {0, 1}) Handle(camera, seconds, TrackingState::kInitializing);
+  }
+  EXPECT_EQ(state_.active_key, 2u);
+}
+
+TEST_F(PolicyForTwoCameras, KeepsAMapThatWasOrderedWhileTheCameraLeftTheLastOne) {
+  options_.new_map_when_lost = true;
+  LoseMapWithAPoint(2);
+  policy_.StartMap(5, 0, false);
+  Handle(0, 2.1, TrackingState::kLost, /*left_map=*/true);
+  EXPECT_EQ(state_.active_key, 5u);
+  EXPECT_EQ(NextOrder(0), Order::kStart);
+}
+
+TEST_F(PolicyForTwoCameras, DoesNotCountARejectedPoseAsALossInTheMapThatWasOrdered) {
+  LoseMapWithAPoint(2);
+  policy_.StartMap(5, 0, false);
+  EXPECT_EQ(Handle(1, 2.1, TrackingState::kSixDof).state, TrackingState::kLost);
+  EXPECT_FALSE(Assignment(1).lost_since());
 }
 
 }  // namespace
