@@ -216,7 +216,7 @@ void MapPolicy::LeaveMap(std::uint64_t key) {
   }
   if (state_.association.map() == key) state_.association.Release();
   found->second.provisional.End();
-  const bool forgotten = found->second.snapshot == nullptr;
+  const bool forgotten = found->second.WasNeverInitialized();
   if (forgotten) state_.maps.erase(found);
   state_.Emit(time, key, MapLeft{forgotten});
 }

@@ -190,7 +190,7 @@ void System::OnMapperUpdate(const MappingThread::MapperUpdate& update) {
     if (!late && (!update.join || IsAwaited(*update.join, found->second))) {
       KnownMap& map = found->second;
       if (update.snapshot) {
-        map.snapshot = update.snapshot;
+        map.SetSnapshot(update.snapshot);
         index_.SetMap(map.key, update.snapshot, described);
         state_.Emit(state_.LastTime(), map.key, MapUpdated{update.snapshot});
       }
@@ -229,14 +229,14 @@ void System::AddMap(std::uint64_t key, std::shared_ptr<const MapSnapshot> snapsh
                     const MapPermissions& permissions) {
   const std::scoped_lock lock(mutex_);
   KnownMap& map = state_.AddMap(key);
-  map.snapshot = std::move(snapshot);
+  map.SetSnapshot(std::move(snapshot));
   map.permissions = permissions;
 }
 
 void System::SetSnapshot(std::uint64_t key, std::shared_ptr<const MapSnapshot> snapshot) {
   const std::scoped_lock lock(mutex_);
   if (const auto found = state_.maps.find(key); found != state_.maps.end() && key != state_.active_key)
-    found->second.snapshot = std::move(snapshot);
+    found->second.SetSnapshot(std::move(snapshot));
 }
 
 bool System::ReplaceSnapshot(std::uint64_t key, const std::shared_ptr<const MapSnapshot>& expected,
@@ -245,7 +245,7 @@ bool System::ReplaceSnapshot(std::uint64_t key, const std::shared_ptr<const MapS
   const auto found = state_.maps.find(key);
   if (found == state_.maps.end() || policy_.IsUsed(key) || found->second.snapshot != expected) return false;
   index_.SetMap(key, snapshot);
-  found->second.snapshot = std::move(snapshot);
+  found->second.SetSnapshot(std::move(snapshot));
   return true;
 }
 
@@ -280,10 +280,9 @@ void System::JoinIntoActiveMap(std::uint64_t from) {
 void System::RemoveMap(std::uint64_t key) {
   const std::scoped_lock lock(mutex_);
   policy_.LeaveMap(key);
-  KnownMap* const map = state_.FindMap(key);
-  if (map == nullptr) return;
-  map->discarded = true;  // Late updates of the mapper are ignored.
   index_.RemoveMap(key);
+  // Late updates of the mapper are ignored.
+  if (KnownMap* const map = state_.FindMap(key)) map->discarded = true;
 }
 
 void System::Activate(std::uint64_t key) {

@@ -37,6 +37,7 @@ struct KnownMap {
   MapPermissions permissions;
   ProvisionalMap provisional;  // pending for a map that was started here until its depth is confirmed
   bool started_here = false;   // by a camera, and not added by the application
+  bool had_snapshot = false;
   bool discarded = false;
   bool after_loss = false;        // started because the camera was lost in another map
   std::uint64_t join_with = 0;    // the map that this one is to be joined into if they overlap; 0 for none
@@ -44,6 +45,13 @@ struct KnownMap {
   std::size_t join_at = 0;        // number of keyframes of both maps from which joining is attempted
   std::uint64_t joined_into = 0;  // the map that it was joined into; 0 for none
 
+  // Null when it is not in memory any more.
+  void SetSnapshot(std::shared_ptr<const MapSnapshot> newer) {
+    had_snapshot |= newer != nullptr;
+    snapshot = std::move(newer);
+  }
+  // It was started here, and the mapper has not made anything of it.
+  bool WasNeverInitialized() const { return started_here && !had_snapshot; }
   // False once the map was discarded or joined into another one.
   bool Exists() const { return !discarded && joined_into == 0; }
   bool MayBeJoined() const { return Exists() && permissions.join && snapshot && snapshot->HasFinitePoints(); }

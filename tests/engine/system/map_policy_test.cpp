@@ -52,12 +52,12 @@ class PolicyForTwoCameras : public ::testing::Test {
   void LoseMapWithAPoint(double seconds) {
     policy_.StartMap(1, 0, false);
     for (const std::size_t camera : {0, 1}) NextOrder(camera);
-    MapOf(1).snapshot = MapWithAPoint();
+    MapOf(1).SetSnapshot(MapWithAPoint());
     for (const std::size_t camera : {0, 1}) Lose(camera, seconds);
   }
   // The application adds a panorama map, and both cameras search it.
   void EnterMapWithoutDepth(std::uint64_t key) {
-    state_.AddMap(key).snapshot = MapWithoutDepth();
+    state_.AddMap(key).SetSnapshot(MapWithoutDepth());
     policy_.EnterMap(key, 0);
     for (const std::size_t camera : {0, 1}) EXPECT_EQ(NextOrder(camera), Order::kEnter);
   }
@@ -73,7 +73,7 @@ class PolicyForTwoCameras : public ::testing::Test {
 TEST_F(PolicyForTwoCameras, ReplacesAMapWithoutDepthThatACameraStarted) {
   policy_.StartMap(1, 1, false);
   for (const std::size_t camera : {0, 1}) NextOrder(camera);
-  MapOf(1).snapshot = MapWithoutDepth();
+  MapOf(1).SetSnapshot(MapWithoutDepth());
   Lose(0, 2);
   Lose(0, 2.2);
   EXPECT_TRUE(MapOf(1).discarded);
@@ -93,7 +93,7 @@ TEST_F(PolicyForTwoCameras, KeepsAMapWithoutDepthThatNoCameraStarted) {
 TEST_F(PolicyForTwoCameras, KeepsAMapWithoutDepthThatMayNotBeDiscarded) {
   policy_.StartMap(1, 0, false);
   for (const std::size_t camera : {0, 1}) NextOrder(camera);
-  MapOf(1).snapshot = MapWithoutDepth();
+  MapOf(1).SetSnapshot(MapWithoutDepth());
   MapOf(1).permissions.discard = false;
   for (const double seconds : {2.0, 2.2, 9.0}) Lose(0, seconds);
   EXPECT_TRUE(MapOf(1).Exists());
@@ -138,6 +138,17 @@ TEST_F(PolicyForTwoCameras, DoesNotCountARejectedPoseAsALossInTheMapThatWasOrder
   policy_.StartMap(5, 0, false);
   EXPECT_EQ(Handle(1, 2.1, TrackingState::kSixDof).state, TrackingState::kLost);
   EXPECT_FALSE(Assignment(1).lost_since());
+}
+
+TEST_F(PolicyForTwoCameras, ForgetsAMapOnlyIfItWasNeverInitialized) {
+  policy_.StartMap(1, 0, false);
+  policy_.LeaveMap(1);
+  EXPECT_FALSE(state_.maps.contains(1));
+  policy_.StartMap(2, 0, false);
+  MapOf(2).SetSnapshot(MapWithoutDepth());
+  MapOf(2).SetSnapshot(nullptr);  // no longer in memory
+  policy_.LeaveMap(2);
+  EXPECT_TRUE(state_.maps.contains(2));
 }
 
 }  // namespace
