@@ -227,9 +227,21 @@ void MapPolicy::Activate(const KnownMap& map) {
 }
 
 void MapPolicy::AssignMapper(std::uint64_t key, std::shared_ptr<const MapSnapshot> snapshot) {
+  SearchInitialViewsAgain();
   state_.active_key = key;
   joins_.Cancel();
   mapping_.Adopt(key, std::move(snapshot));
+}
+
+// The mapper drops what it was given for the active map, and says nothing of the initial views among it, so
+// that the camera that found them would wait for the map for ever. A map with finite points was made of them.
+void MapPolicy::SearchInitialViewsAgain() {
+  const KnownMap* const map = state_.FindMap(state_.active_key);
+  if (map == nullptr || (map->snapshot && map->snapshot->HasFinitePoints())) return;
+  for (SystemCamera& camera : state_.cameras) {
+    if (camera.assignment.map() == map->key && !camera.assignment.has_order())
+      camera.assignment.FailStart(map->snapshot != nullptr, map->after_loss);
+  }
 }
 
 bool MapPolicy::IsUsed(std::uint64_t key) const {

@@ -54,6 +54,7 @@ class MapPolicy {
   // Discards the map of this camera, and starts another one instead.
   void Discard(std::size_t index, Timestamp time, MapDiscarded event);
   void AssignMapper(std::uint64_t key, std::shared_ptr<const MapSnapshot> snapshot);
+  void SearchInitialViewsAgain();
   std::uint64_t NewKey() const;  // 0 if there is none now
 
   const SystemOptions& options_;

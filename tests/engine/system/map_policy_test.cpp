@@ -151,5 +151,40 @@ TEST_F(PolicyForTwoCameras, ForgetsAMapOnlyIfItWasNeverInitialized) {
   EXPECT_TRUE(state_.maps.contains(2));
 }
 
+TEST_F(PolicyForTwoCameras, SearchesInitialViewsAgainThatTheMapperDrops) {
+  policy_.StartMap(1, 0, false);
+  for (const std::size_t camera : {0, 1}) NextOrder(camera);
+  policy_.Activate(MapOf(1));
+  EXPECT_EQ(NextOrder(0), Order::kStart);
+  EXPECT_EQ(NextOrder(1), Order::kNone) << "it waits for the map";
+  MapOf(1).SetSnapshot(MapWithoutDepth());
+  policy_.EnterMap(1, 0);  // which is the current one
+  EXPECT_EQ(NextOrder(0), Order::kStartAgain) << "the panorama map stays";
+  MapOf(1).permissions.extend = false;
+  policy_.Activate(MapOf(1));
+  MapOf(1).permissions.extend = true;
+  policy_.Activate(MapOf(1));
+  EXPECT_EQ(NextOrder(0), Order::kStartAgain) << "its policy was changed";
+}
+
+TEST_F(PolicyForTwoCameras, TracksAMapThatTheMapperHasMadeOfTheInitialViews) {
+  policy_.StartMap(1, 0, false);
+  for (const std::size_t camera : {0, 1}) NextOrder(camera);
+  MapOf(1).SetSnapshot(MapWithAPoint());
+  policy_.Activate(MapOf(1));
+  EXPECT_EQ(NextOrder(0), Order::kNone);
+}
+
+TEST_F(PolicyForTwoCameras, StartsAMapWithOneCameraAlthoughItIsActivatedAtOnce) {
+  policy_.StartMap(1, 0, false);
+  for (const std::size_t camera : {0, 1}) NextOrder(camera);
+  MapOf(1).permissions.extend = false;
+  policy_.Activate(MapOf(1));
+  policy_.StartMap(2, 1, false);
+  policy_.Activate(MapOf(2));
+  EXPECT_EQ(NextOrder(0), Order::kEnter);
+  EXPECT_EQ(NextOrder(1), Order::kStart);
+}
+
 }  // namespace
 }  // namespace docent::engine
