@@ -117,6 +117,7 @@ struct AuthoringFacts {
   bool unsaved = false;
   std::optional<double> saved_ago_s;      // Since the last save; empty before the first.
   const content::Scene* scene = nullptr;  // Of the current map; null without one.
+  std::uint64_t map_key = 0;              // Of the map that the scene belongs to.
   // Valid with has_pose.
   engine::Rigid3 camera_from_map;
   bool has_pose = false;

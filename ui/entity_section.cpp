@@ -8,6 +8,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <utility>
 
 #include "ui/entity_shapes.h"
 #include "ui/strings.h"
@@ -164,30 +165,52 @@ void EntitySection::DrawRow(const content::Entity& entity, const AuthoringFacts&
 }
 
 void EntitySection::DrawSelected(const AuthoringFacts& facts) {
+  FollowRename(facts);
+  if (const content::Entity* const shown = EntityToShow(facts)) {
+    DrawFields(*shown, facts);
+  } else {
+    shown_.clear();
+    is_writing_ = begin_rename_ = false;
+  }
   const std::vector<std::string>& names = facts.selection->names();
   const content::Entity* const first =
       facts.scene != nullptr && !names.empty() ? facts.scene->Find(names.front()) : nullptr;
   if (first == nullptr) {
-    shown_.clear();
-    begin_rename_ = false;
     Remark(strings::kNothingSelected);
     ImGui::BeginDisabled(!facts.has_copy);
     if (ImGui::Button(strings::kPaste)) actions_->Paste();
     ImGui::EndDisabled();
     return;
   }
-  if (names.size() == 1) {
-    DrawFields(*first, facts);
-  } else {
-    ImGui::Text(strings::kManySelected, static_cast<int>(names.size()));
-  }
+  if (names.size() > 1) ImGui::Text(strings::kManySelected, static_cast<int>(names.size()));
   DrawButtons(*first, facts);
 }
 
+const content::Entity* EntitySection::EntityToShow(const AuthoringFacts& facts) const {
+  if (facts.scene == nullptr) return nullptr;
+  const content::Entity* const written =
+      is_writing_ && shown_map_ == facts.map_key ? facts.scene->Find(shown_) : nullptr;
+  if (written != nullptr) return written;
+  const std::vector<std::string>& names = facts.selection->names();
+  return names.size() == 1 ? facts.scene->Find(names.front()) : nullptr;
+}
+
+void EntitySection::FollowRename(const AuthoringFacts& facts) {
+  if (asked_name_.empty() || facts.scene == nullptr || shown_map_ != facts.map_key) return;
+  if (facts.scene->Find(shown_) != nullptr || facts.scene->Find(asked_name_) == nullptr) return;
+  shown_ = std::exchange(asked_name_, {});
+}
+
 void EntitySection::Fill(const content::Entity& entity, const AuthoringFacts& facts) {
-  const bool other = std::exchange(shown_, entity.name) != entity.name;
+  const bool other = shown_ != entity.name || shown_map_ != facts.map_key;
   if (is_writing_ && !other) return;
-  if (other) language_.clear();
+  if (other) {
+    shown_ = entity.name;
+    shown_map_ = facts.map_key;
+    fields_id_ = std::to_string(shown_map_) + " " + shown_;
+    asked_name_.clear();
+    language_.clear();
+  }
   name_ = entity.name;
   text_ = TextIn(entity, content::LanguageTag(language_));
   for (int i = 0; i < 3; ++i) offset_[i] = entity.label.offset[i];
@@ -206,18 +229,26 @@ void EntitySection::Fill(const content::Entity& entity, const AuthoringFacts& fa
 void EntitySection::DrawFields(const content::Entity& entity, const AuthoringFacts& facts) {
   Fill(entity, facts);
   is_writing_ = false;
+  ImGui::PushID(fields_id_.c_str());
   ImGui::BeginDisabled(entity.locked);
-  ImGui::SetNextItemWidth(-1.0f);
-  if (std::exchange(begin_rename_, false)) ImGui::SetKeyboardFocusHere();
-  ImGui::InputText("##name", &name_);
-  is_writing_ = ImGui::IsItemActive();
-  if (ImGui::IsItemDeactivatedAfterEdit() && name_ != entity.name && !name_.empty())
-    actions_->Rename(entity.name, name_);
+  DrawName(entity, facts);
   if (content::TextOf(entity) != nullptr) DrawText(entity);
   if (entity.kind == content::Entity::Kind::kSignpost) DrawSignpost(entity, facts);
   DrawLabelAndTrail(entity);
   DrawPose(entity, facts);
   ImGui::EndDisabled();
+  ImGui::PopID();
+}
+
+void EntitySection::DrawName(const content::Entity& entity, const AuthoringFacts& facts) {
+  ImGui::SetNextItemWidth(-1.0f);
+  if (std::exchange(begin_rename_, false)) ImGui::SetKeyboardFocusHere();
+  ImGui::InputText("##name", &name_);
+  is_writing_ = ImGui::IsItemActive();
+  if (!ImGui::IsItemDeactivatedAfterEdit() || name_ == entity.name || name_.empty()) return;
+  // A name that another entity has is refused.
+  if (facts.scene->Find(name_) == nullptr) asked_name_ = name_;
+  actions_->Rename(entity.name, name_);
 }
 
 // The text and, below it, the language whose variant it is.

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <cstdint>
 #include <set>
 #include <string>
 #include <vector>
@@ -22,7 +23,14 @@ class EntitySection {
 
  private:
   void DrawRow(const content::Entity& entity, const AuthoringFacts& facts);
+  // The entity whose fields are drawn: the one that is selected alone. While one of its fields is being
+  // written, it stays the one that they belong to, so that what was typed becomes a change of that one: a
+  // click in the image has selected another one before the field is left. Null for none.
+  const content::Entity* EntityToShow(const AuthoringFacts& facts) const;
+  // Lets the fields stay those of the entity that they belong to once it has the name that was asked for.
+  void FollowRename(const AuthoringFacts& facts);
   void DrawFields(const content::Entity& entity, const AuthoringFacts& facts);
+  void DrawName(const content::Entity& entity, const AuthoringFacts& facts);
   void DrawText(const content::Entity& entity);
   void DrawSignpost(const content::Entity& entity, const AuthoringFacts& facts);
   void DrawLabelAndTrail(const content::Entity& entity);
@@ -34,7 +42,12 @@ class EntitySection {
 
   AuthoringActions* const actions_;
   bool begin_rename_ = false, is_writing_ = false;
-  std::string shown_;  // The entity that the fields belong to.
+  std::string shown_;            // The entity that the fields belong to; empty for none.
+  std::uint64_t shown_map_ = 0;  // The map that it is in.
+  std::string asked_name_;       // The new name of it that was asked for; empty for none.
+  // By what Dear ImGui tells the fields of one entity from those of another. It stays when the entity gets
+  // another name, so that a field that is being written keeps the keyboard.
+  std::string fields_id_;
   std::string name_, text_;
   std::string language_;             // Of the text that is shown; empty for the first one.
   std::set<std::string> languages_;  // Those of the texts of the scene.

@@ -1,0 +1,109 @@
+// SPDX-License-Identifier: Apache-2.0
+// To which entity the fields of the panel write.
+#include "ui/entity_section.h"
+
+#include <gmock/gmock.h>
+
+#include "tests/ui/panel_without_screen.h"
+
+namespace docent::ui {
+namespace {
+
+using ::testing::ElementsAre;
+using ::testing::IsEmpty;
+
+// Two signposts, of which the first is selected.
+class FieldsOfEntities : public PanelWithoutScreen {
+ protected:
+  FieldsOfEntities() {
+    scene_.entities.resize(2);
+    scene_.entities[0].name = "sign-1";
+    scene_.entities[0].signpost.text = "Elephants";
+    scene_.entities[1].name = "sign-2";
+    scene_.entities[1].signpost.text = "Giraffes";
+    facts_.scene = &scene_;
+    facts_.map_key = 1;
+    facts_.selection = &selection_;
+    selection_.Set({"sign-1"});
+    for (int i = 0; i < 3; ++i) Draw();
+  }
+  void DrawPart() override { section_.DrawSelected(facts_); }
+
+  // The first fields are below each other; a click at the right end puts the cursor behind the text.
+  static float FirstLine() { return ImGui::GetStyle().WindowPadding.y + 0.5f * ImGui::GetFrameHeight(); }
+  void ClickName() { Click(kWidth - 40, FirstLine()); }
+  void ClickText() { Click(kWidth - 40, FirstLine() + ImGui::GetFrameHeightWithSpacing()); }
+  // A click in the image, which changes the selection before the panel is drawn.
+  void ClickImageAndSelect(std::vector<std::string> names) {
+    MoveToImage();
+    selection_.Set(std::move(names));
+    PressAndRelease();
+  }
+
+  content::Scene scene_;
+  Selection selection_;
+  EntitySection section_{&asked_};
+};
+
+TEST_F(FieldsOfEntities, WhatIsBeingWrittenBelongsToTheEntityThatWasSelected) {
+  ClickText();
+  ASSERT_TRUE(WritesText());
+  Type("!");
+  EXPECT_THAT(asked_.words, IsEmpty()) << "the field has not been left yet";
+  ClickImageAndSelect({"sign-2"});
+  EXPECT_THAT(asked_.words, ElementsAre("text sign-1 Elephants!"));
+  asked_.words.clear();
+  // From then on the fields are those of the other one.
+  ClickName();
+  Type("b");
+  ClickImage();
+  EXPECT_THAT(asked_.words, ElementsAre("rename sign-2 sign-2b"));
+}
+
+TEST_F(FieldsOfEntities, AFieldWithoutAChangeChangesNothingOfTheNextEntity) {
+  ClickName();
+  ASSERT_TRUE(WritesText());
+  ClickImageAndSelect({"sign-2"});
+  EXPECT_THAT(asked_.words, IsEmpty());
+}
+
+TEST_F(FieldsOfEntities, AClickIntoNothingKeepsWhatWasWritten) {
+  ClickText();
+  Type("!");
+  ClickImageAndSelect({});
+  EXPECT_THAT(asked_.words, ElementsAre("text sign-1 Elephants!"));
+}
+
+TEST_F(FieldsOfEntities, SelectingAFurtherEntityKeepsWhatWasWritten) {
+  ClickText();
+  Type("!");
+  ClickImageAndSelect({"sign-1", "sign-2"});
+  EXPECT_THAT(asked_.words, ElementsAre("text sign-1 Elephants!"));
+}
+
+TEST_F(FieldsOfEntities, NothingIsWrittenToAnEntityOfAnotherMapWithTheSameName) {
+  ClickText();
+  Type("!");
+  facts_.map_key = 2;
+  Draw();
+  ClickImage();
+  EXPECT_THAT(asked_.words, IsEmpty());
+}
+
+TEST_F(FieldsOfEntities, AFieldIsWrittenOnWhileTheEntityGetsItsNewName) {
+  ClickName();
+  Type("b");
+  ClickText();
+  ASSERT_THAT(asked_.words, ElementsAre("rename sign-1 sign-1b"));
+  Type("!");
+  scene_.entities[0].name = "sign-1b";
+  selection_.Rename("sign-1", "sign-1b");
+  Draw();
+  EXPECT_TRUE(WritesText());
+  Type("?");
+  ClickImageAndSelect({});
+  EXPECT_THAT(asked_.words, ElementsAre("rename sign-1 sign-1b", "text sign-1b Elephants!?"));
+}
+
+}  // namespace
+}  // namespace docent::ui
