@@ -34,6 +34,12 @@ bool ChooseToPlace(const std::string& file, ui::AuthoringChoices* choices) {
   return false;
 }
 
+// Whether commands are no longer for the map that the camera was in.
+bool LeavesMap(const Command& done) {
+  return std::holds_alternative<NewMap>(done) || std::holds_alternative<StopMap>(done) ||
+         std::holds_alternative<UseMap>(done) || std::holds_alternative<RemoveMap>(done);
+}
+
 }  // namespace
 
 AuthorControls::AuthorControls(ui::Window* window, Host host, std::filesystem::path model_folder)
@@ -67,6 +73,7 @@ void AuthorControls::Take(const std::vector<Notice>& notices) {
     board_.AddError(notice.problem);
     if (!notice.done) continue;
     board_.AddDone(DoneText(*notice.done), CanBeUndone(*notice.done), Now());
+    leaves_map_ = leaves_map_ || LeavesMap(*notice.done);
     if (const auto* renamed = std::get_if<RenameEntity>(&*notice.done))
       selection_.Rename(renamed->name, renamed->new_name);
   }
@@ -84,11 +91,28 @@ void AuthorControls::SetView(AuthorView view, const SavingState& saving, std::ve
     placing_.Cancel();
     fitting_.End();
     names_before_.reset();
+    content_.reset();
+    map_from_upright_ = {};
   }
+  KeepContent();
   if (map == 0) return;
   SelectNew();
   selection_.KeepExisting(view_.scene.get());
   fitting_.KeepExisting(view_.scene.get());
+}
+
+void AuthorControls::KeepContent() {
+  if (!view_.frame) return;
+  if (view_.frame->tracked.map_key == 0) {
+    if (leaves_map_ || !view_.frame->shown.starting_map.empty()) content_.reset();
+    return;
+  }
+  if (!content_) leaves_map_ = false;
+  if (!view_.scene) return;
+  content_ = view_.scene;
+  if (!view_.has_pose()) return;
+  map_from_upright_ = UprightRotation(*content_, *view_.frame->tracked.map);
+  camera_from_map_ = view_.camera.camera_from_map;
 }
 
 // Entities that a command of this window has added are selected when they appear.
@@ -106,8 +130,8 @@ void AuthorControls::SelectNew() {
 
 void AuthorControls::RememberNames() {
   names_before_.emplace();
-  if (!view_.scene) return;
-  for (const content::Entity& entity : view_.scene->entities) names_before_->push_back(entity.name);
+  if (!content_) return;
+  for (const content::Entity& entity : content_->entities) names_before_->push_back(entity.name);
 }
 
 bool AuthorControls::IsPlacing() const {
@@ -316,16 +340,16 @@ ui::AuthoringFacts AuthorControls::Facts() const {
   facts.selection = &selection_;
   facts.files = &files_;
   facts.has_copy = !copied_names_.empty();
-  facts.fit = fitting_.Facts(view_.scene.get());
+  facts.fit = fitting_.Facts(content_.get());
+  facts.scene = content_.get();
+  facts.map_key = scene_map_;
+  facts.map_from_upright = map_from_upright_;
+  facts.camera_from_map = camera_from_map_;
   if (!view_.frame) return facts;
-  const engine::TrackedFrame& tracked = view_.frame->tracked;
   const Session::Shown& shown = view_.frame->shown;
   facts.starting = !shown.starting_map.empty();
   facts.map_name = facts.starting ? shown.starting_map : shown.map_name;
-  facts.scene = view_.scene.get();
   facts.has_pose = view_.has_pose();
-  facts.camera_from_map = view_.camera.camera_from_map;
-  if (facts.has_pose && view_.scene) facts.map_from_upright = UprightRotation(*view_.scene, *tracked.map);
   return facts;
 }
 
@@ -397,12 +421,12 @@ void AuthorControls::ChooseFile(content::AssetKind kind) {
 
 // Entities of a group are selected together.
 void AuthorControls::Select(const std::string& name, bool add) {
-  const content::Entity* const entity = view_.scene ? view_.scene->Find(name) : nullptr;
+  const content::Entity* const entity = content_ ? content_->Find(name) : nullptr;
   if (entity == nullptr || entity->group.empty()) return selection_.Select(name, add);
   const bool removes = add && selection_.Contains(name);
   std::vector<std::string> names;
   if (add) names = selection_.names();
-  for (const content::Entity& other : view_.scene->entities) {
+  for (const content::Entity& other : content_->entities) {
     if (other.group != entity->group) continue;
     std::erase(names, other.name);
     if (!removes) names.push_back(other.name);
@@ -438,9 +462,9 @@ void AuthorControls::Paste() {
 
 // Under the first unused name of "group-1", "group-2" ...
 void AuthorControls::Group(const std::vector<std::string>& names) {
-  if (!view_.scene) return;
+  if (!content_) return;
   const auto is_used = [&](const std::string& group) {
-    return std::any_of(view_.scene->entities.begin(), view_.scene->entities.end(),
+    return std::any_of(content_->entities.begin(), content_->entities.end(),
                        [&](const content::Entity& entity) { return entity.group == group; });
   };
   int number = 1;

@@ -92,6 +92,8 @@ class AuthorControls final : public CommandActions {
   // Before a command that adds entities, so that SelectNew finds them.
   void RememberNames();
   void SelectNew();
+  // Keeps what the panel shows of the map of the view.
+  void KeepContent();
   void UpdatePreview();
   double Now() const;
   ui::AuthoringFacts Facts() const;
@@ -127,6 +129,13 @@ class AuthorControls final : public CommandActions {
   // Names before a command that adds entities, which are selected when they appear.
   std::optional<std::vector<std::string>> names_before_;
   std::uint64_t scene_map_ = 0;  // The map whose entities are selected.
+  // What the panel shows of that map, as it was seen last, so that what is being written there is not lost
+  // with the camera. The content is null before it was seen, and while a lost camera is meant to leave the
+  // map.
+  std::shared_ptr<const content::Scene> content_;
+  engine::Rotation3 map_from_upright_;
+  engine::Rigid3 camera_from_map_;
+  bool leaves_map_ = false;  // By a command; until the camera is in a map again.
   Ending ending_ = Ending::kNone;
 };
 

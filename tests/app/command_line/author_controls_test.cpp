@@ -1,0 +1,131 @@
+// SPDX-License-Identifier: Apache-2.0
+// The author's controls on a virtual screen, with frames that the test makes.
+#include "app/command_line/author_controls.h"
+
+#include <gmock/gmock.h>
+
+#include <atomic>
+#include <chrono>
+#include <cstdlib>
+#include <optional>
+#include <thread>
+
+#include "tests/app/support/temporary_folder.h"
+#include "tests/support/virtual_screen.h"
+
+namespace docent::app {
+namespace {
+
+using ::testing::ElementsAre;
+using ::testing::IsEmpty;
+
+// An author whose camera is in a map with a signpost, and who writes its name.
+class AuthorAtControls : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    if (!screen_.works()) GTEST_SKIP() << "Xvfb is not installed";
+    if (!HasXdotool()) GTEST_SKIP() << "xdotool is not installed";
+    setenv("XDG_STATE_HOME", folder_.path().c_str(), 1);
+    content::Scene scene;
+    scene.entities.resize(1);
+    scene.entities[0].name = "sign-1";
+    scene_ = std::make_shared<const content::Scene>(std::move(scene));
+    window_.emplace("Docent", 1280, 1000);
+    AuthorControls::Host host;
+    host.emit = [this](Command command) { commands_.push_back(std::move(command)); };
+    controls_.emplace(&*window_, std::move(host), folder_.path());
+    Draw(5);
+  }
+  void TearDown() override { unsetenv("XDG_STATE_HOME"); }
+
+  void Draw(int frames) {
+    for (int i = 0; i < frames; ++i) {
+      for (const ui::InputEvent& event : window_->PollEvents()) controls_->Handle(event);
+      const Eigen::Vector2i size = window_->WindowSize();
+      const ui::WindowLayout layout =
+          ui::LayOutWindow(size.x(), size.y(), 1, controls_->choices().panel_open);
+      controls_->SetView(Seen(layout), {}, {});
+      controls_->Update();
+      controls_->Draw(layout);
+      window_->Show();
+    }
+  }
+  AuthorView Seen(const ui::WindowLayout& layout) const {
+    AuthorView view;
+    auto frame = std::make_shared<ShownFrame>();
+    frame->tracked.state = engine::TrackingState::kLost;
+    if (is_in_map_) {
+      frame->tracked.map_key = 7;
+      frame->shown.map_name = "Hall";
+      view.scene = frame->shown.scene = scene_;
+    }
+    view.frame = std::move(frame);
+    view.image = layout.image;
+    view.box = ui::FitImage(640, 480, layout.image);
+    return view;
+  }
+
+  // Draws while the author acts; the words are those of xdotool.
+  void Act(const std::string& xdotool) {
+    std::atomic<bool> done = false;
+    std::thread hand([&] {
+      EXPECT_EQ(std::system(("xdotool search --name Docent windowfocus sleep 0.1 " + xdotool).c_str()), 0);
+      done = true;
+    });
+    while (!done) {
+      Draw(1);
+      std::this_thread::sleep_for(std::chrono::milliseconds(5));
+    }
+    hand.join();
+    Draw(5);
+  }
+  void WriteName() {
+    controls_->Select("sign-1", false);
+    ui::InputEvent rename;
+    rename.key = "f2";
+    controls_->Handle(rename);
+    Draw(5);
+    Act("key ctrl+a sleep 0.1 type --delay 60 Cove");
+  }
+  void PressReturn() { Act("keydown Return sleep 0.1 keyup Return sleep 0.1"); }
+
+  const TemporaryFolder folder_;
+  VirtualScreen screen_{"1280x1024"};
+  std::shared_ptr<const content::Scene> scene_;
+  std::vector<Command> commands_;
+  std::optional<ui::Window> window_;
+  std::optional<AuthorControls> controls_;
+  bool is_in_map_ = true;
+};
+
+TEST_F(AuthorAtControls, WhatIsBeingWrittenIsNotLostWithTheCamera) {
+  WriteName();
+  is_in_map_ = false;
+  Draw(3);
+  is_in_map_ = true;
+  Draw(3);
+  EXPECT_THAT(commands_, IsEmpty());
+  PressReturn();
+  EXPECT_THAT(commands_, ElementsAre(Command(RenameEntity{"sign-1", "Cove"})));
+}
+
+TEST_F(AuthorAtControls, WhatIsWrittenIsACommandAlsoWhileTheCameraIsLost) {
+  WriteName();
+  is_in_map_ = false;
+  Draw(3);
+  PressReturn();
+  EXPECT_THAT(commands_, ElementsAre(Command(RenameEntity{"sign-1", "Cove"})));
+}
+
+TEST_F(AuthorAtControls, NothingIsWrittenToTheMapThatTheAuthorGoesTo) {
+  WriteName();
+  controls_->Take({Notice{"", UseMap{"Room"}}});
+  Draw(3);
+  is_in_map_ = false;
+  Draw(3);
+  PressReturn();
+  EXPECT_THAT(commands_, IsEmpty());
+}
+
+}  // namespace
+}  // namespace docent::app
