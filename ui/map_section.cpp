@@ -32,6 +32,11 @@ const char* PolicyText(const std::string& policy) {
   return policy.c_str();
 }
 
+bool HasMap(const AuthoringFacts& facts, const std::string& name) {
+  return std::any_of(facts.maps.begin(), facts.maps.end(),
+                     [&](const MapFacts& map) { return map.name == name; });
+}
+
 }  // namespace
 
 bool MatchesFilter(const std::string& name, const std::string& filter) {
@@ -43,6 +48,7 @@ bool MatchesFilter(const std::string& name, const std::string& filter) {
 void MapSection::Draw(const AuthoringFacts& facts) {
   if (begins_rename_) {
     chosen_ = name_ = facts.map_name;
+    asked_name_.clear();
     asks_removal_ = false;
     filter_.clear();
   }
@@ -54,6 +60,7 @@ void MapSection::Draw(const AuthoringFacts& facts) {
   } else {
     filter_.clear();
   }
+  FollowRename(facts);
   DrawList(facts);
   const auto found = std::find_if(facts.maps.begin(), facts.maps.end(),
                                   [&](const MapFacts& map) { return map.name == chosen_; });
@@ -75,11 +82,17 @@ void MapSection::DrawList(const AuthoringFacts& facts) {
       if (ImGui::Selectable(label.c_str(), chosen_ == map.name)) {
         chosen_ = chosen_ == map.name ? "" : map.name;
         name_ = chosen_;
+        asked_name_.clear();
         asks_removal_ = false;
       }
     }
   }
   ImGui::EndChild();
+}
+
+void MapSection::FollowRename(const AuthoringFacts& facts) {
+  if (asked_name_.empty() || HasMap(facts, chosen_) || !HasMap(facts, asked_name_)) return;
+  chosen_ = std::exchange(asked_name_, {});
 }
 
 void MapSection::DrawChosen(const MapFacts& map, const AuthoringFacts& facts) {
@@ -93,16 +106,23 @@ void MapSection::DrawChosen(const MapFacts& map, const AuthoringFacts& facts) {
     if (ImGui::Button(strings::kJoinMap)) actions_->JoinMap(map.name);
     if (ImGui::IsItemHovered()) ImGui::SetTooltip("%s", strings::kJoinMapHelp);
   }
+  DrawName(map, facts);
+  if (map.is_initialized) DrawPolicy(map);
+  DrawRemoval(map);
+}
+
+void MapSection::DrawName(const MapFacts& map, const AuthoringFacts& facts) {
   ImGui::SetNextItemWidth(0.65f * ImGui::GetContentRegionAvail().x);
   if (std::exchange(begins_rename_, false)) ImGui::SetKeyboardFocusHere();
   ImGui::InputText(strings::kRename, &name_);
-  // When the field is left; a name that is refused is reset.
-  if (ImGui::IsItemDeactivatedAfterEdit() && name_ != map.name) {
-    actions_->RenameMap(map.name, name_);
-    chosen_ = name_;
-  }
-  if (map.is_initialized) DrawPolicy(map);
-  DrawRemoval(map);
+  // When the field is left.
+  if (!ImGui::IsItemDeactivatedAfterEdit() || name_ == map.name) return;
+  asks_removal_ = false;
+  actions_->RenameMap(map.name, name_);
+  // A map without a name, or with that of another one, is refused: its field is reset, and it stays chosen.
+  const bool is_refused = name_.empty() || HasMap(facts, name_);
+  asked_name_ = is_refused ? "" : name_;
+  if (is_refused) name_ = map.name;
 }
 
 void MapSection::DrawPolicy(const MapFacts& map) {
@@ -124,6 +144,7 @@ void MapSection::DrawRemoval(const MapFacts& map) {
   MapRemark(strings::kRemoveMapQuestion);
   if (ImGui::Button(strings::kRemoveMapNow)) {
     actions_->RemoveMap(map.name);
+    asked_name_.clear();
     asks_removal_ = false;
   }
   ImGui::SameLine();

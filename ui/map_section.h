@@ -21,14 +21,18 @@ class MapSection {
 
  private:
   void DrawList(const AuthoringFacts& facts);
+  // Chooses the chosen map under its new name once the list has that.
+  void FollowRename(const AuthoringFacts& facts);
   void DrawChosen(const MapFacts& map, const AuthoringFacts& facts);
+  void DrawName(const MapFacts& map, const AuthoringFacts& facts);
   void DrawPolicy(const MapFacts& map);
   void DrawRemoval(const MapFacts& map);
 
   AuthoringActions* const actions_;
   std::string filter_;
-  std::string chosen_;  // Name of the chosen map; empty for none.
-  std::string name_;    // As it is being written.
+  std::string chosen_;      // Name of the chosen map; empty for none.
+  std::string name_;        // As it is being written.
+  std::string asked_name_;  // The new name of the chosen map that was asked for; empty for none.
   bool asks_removal_ = false;
   bool begins_rename_ = false;
 };
