@@ -4,7 +4,9 @@
 #include <sndfile.h>
 
 #include <algorithm>
+#include <cmath>
 #include <cstring>
+#include <iterator>
 #include <memory>
 #include <string_view>
 
@@ -78,6 +80,15 @@ SoundFile OpenSound(const std::string& name, SoundBytes* bytes, SoundFormat* for
   return file;
 }
 
+// A sample in the range of -1 to 1 at 16 bits. One that libsndfile made of 16 bits, by dividing by 32768,
+// becomes exactly what it was. Files of floating-point numbers may have others: they are clipped, and what is
+// no number is silence.
+std::int16_t SampleAt16Bits(float sample) {
+  constexpr float kScale = 32'768, kLeast = -32'768, kMost = 32'767;
+  if (std::isnan(sample)) return 0;
+  return static_cast<std::int16_t>(std::lrint(std::clamp(kScale * sample, kLeast, kMost)));
+}
+
 }  // namespace
 
 bool IsSoundFile(std::span<const std::uint8_t> bytes) {
@@ -99,7 +110,8 @@ struct SoundReader::Impl {
   SoundBytes source;
   SoundFormat format;
   SoundFile file;
-  std::uint64_t done = 0;  // Frames.
+  std::uint64_t done = 0;      // Frames.
+  std::vector<float> samples;  // Those that were read last.
 };
 
 SoundReader::SoundReader(const std::string& file, std::span<const std::uint8_t> bytes)
@@ -121,11 +133,17 @@ std::uint64_t SoundReader::Read(std::uint64_t frames, std::vector<std::int16_t>*
   const std::uint64_t wanted = std::min(frames, impl_->format.frames - impl_->done);
   if (wanted == 0) return 0;
   const auto channels = static_cast<std::uint64_t>(impl_->format.channels);
-  const std::size_t before = samples->size();
-  samples->resize(before + wanted * channels);
-  const sf_count_t read =
-      sf_readf_short(impl_->file.get(), samples->data() + before, static_cast<sf_count_t>(wanted));
-  if (read != static_cast<sf_count_t>(wanted)) Refuse(impl_->name, "", "the sound ends too early.");
+  // libsndfile does not scale files of floating-point numbers when it is asked for integers.
+  constexpr std::uint64_t kFramesAtOnce = 16'384;
+  std::vector<float>& piece = impl_->samples;
+  for (std::uint64_t left = wanted; left > 0;) {
+    const std::uint64_t count = std::min(left, kFramesAtOnce);
+    piece.resize(count * channels);
+    const sf_count_t read = sf_readf_float(impl_->file.get(), piece.data(), static_cast<sf_count_t>(count));
+    if (read != static_cast<sf_count_t>(count)) Refuse(impl_->name, "", "the sound ends too early.");
+    std::transform(piece.begin(), piece.end(), std::back_inserter(*samples), SampleAt16Bits);
+    left -= count;
+  }
   impl_->done += wanted;
   return wanted;
 }

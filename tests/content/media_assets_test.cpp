@@ -5,7 +5,9 @@
 
 #include <cmath>
 #include <filesystem>
+#include <limits>
 #include <numbers>
+#include <utility>
 
 #include "content/asset.h"
 #include "content/flat_image.h"
@@ -16,6 +18,7 @@
 namespace docent::content {
 namespace {
 
+using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 
 TEST(ImageAssets, AnImageBecomesAFlatModelWithItsProportions) {
@@ -50,6 +53,32 @@ TEST(ImageAssets, WhatIsNoWholeImageIsRefused) {
   EXPECT_THAT(ErrorOf([&] { FlatImageModel("a.png", bytes); }), HasSubstr("at most 8192 a side"));
 }
 
+TEST(ImageAssets, DataThatAreFarMoreThanTheHeaderSaysAreNotInflatedToTheirEnd) {
+  std::vector<std::uint8_t> rows = PngRows(4, 2);
+  const auto refusal = [&] {
+    return ErrorOf([&] { FlatImageModel("a.png", PngWith(4, 2, StoredData(rows))); });
+  };
+  rows.resize(rows.size() + 100, 0);
+  EXPECT_EQ(refusal(), "") << "some programs write a few zeros behind the last row";
+  rows.resize(1'000'000, 0);
+  EXPECT_THAT(refusal(), HasSubstr("cannot be decoded"));
+}
+
+TEST(ImageAssets, AnInterlacedImageAndOneWithAWrongChecksumAreShown) {
+  // The seven passes of an image of 5 x 5 pixels.
+  std::vector<std::uint8_t> rows;
+  for (const auto& [width, height] : {std::pair(1, 1), {1, 1}, {2, 1}, {1, 2}, {3, 1}, {2, 3}, {5, 2}}) {
+    for (const std::uint8_t byte :
+         PngRows(static_cast<std::uint32_t>(width), static_cast<std::uint32_t>(height)))
+      rows.push_back(byte);
+  }
+  const auto interlaced = FlatImageModel("a.png", PngWith(5, 5, StoredData(rows), true));
+  EXPECT_EQ(interlaced->images[0].rgba[4 * 24], 200);
+  std::vector<std::uint8_t> data = StoredData(PngRows(5, 5));
+  data.back() ^= 1;
+  EXPECT_EQ(FlatImageModel("a.png", PngWith(5, 5, data))->images[0].rgba[0], 200);
+}
+
 TEST(SoundAssets, ASoundKnowsItsLength) {
   for (const int format : {SF_FORMAT_WAV | SF_FORMAT_PCM_16, SF_FORMAT_FLAC | SF_FORMAT_PCM_16,
                            SF_FORMAT_OGG | SF_FORMAT_VORBIS}) {
@@ -69,6 +98,31 @@ TEST(SoundAssets, DecodingGivesTheSamples) {
   for (std::size_t i = 0; i < sound.samples.size(); i += 2) {
     ASSERT_EQ(sound.samples[i], SampleOfTone(i / 2, 8000));
     ASSERT_EQ(sound.samples[i + 1], -SampleOfTone(i / 2, 8000));
+  }
+}
+
+TEST(SoundAssets, SamplesOf16BitsStayWhatTheyAre) {
+  std::vector<std::int16_t> all;
+  for (int sample = -32'768; sample < 32'768; ++sample) all.push_back(static_cast<std::int16_t>(sample));
+  for (const int format : {SF_FORMAT_WAV | SF_FORMAT_PCM_16, SF_FORMAT_FLAC | SF_FORMAT_PCM_16}) {
+    const auto bytes = SoundBytesBy(format, 1, 8000, [&](SNDFILE* file) {
+      sf_writef_short(file, all.data(), static_cast<sf_count_t>(all.size()));
+    });
+    EXPECT_EQ(DecodeSound("all", bytes).samples, all) << format;
+  }
+}
+
+TEST(SoundAssets, SamplesOfFloatingPointNumbersAreScaledAndClipped) {
+  constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
+  constexpr float kInfinity = std::numeric_limits<float>::infinity();
+  const std::vector<float> samples = {0, 0.25f, -0.5f, 1, -1, 1.5f, -7, kNan, kInfinity};
+  for (const int format : {SF_FORMAT_WAV | SF_FORMAT_FLOAT, SF_FORMAT_WAV | SF_FORMAT_DOUBLE}) {
+    const auto bytes = SoundBytesBy(format, 1, 8000, [&](SNDFILE* file) {
+      sf_writef_float(file, samples.data(), static_cast<sf_count_t>(samples.size()));
+    });
+    EXPECT_THAT(DecodeSound("bell", bytes).samples,
+                ElementsAre(0, 8192, -16'384, 32'767, -32'768, 32'767, -32'768, 0, 32'767))
+        << format;
   }
 }
 
