@@ -88,20 +88,43 @@ std::string WithoutNumber(const std::string& name) {
   return numbered ? name.substr(0, end - 1) : name;
 }
 
-// Gives each entity a free name, and adds them at the end of the list.
+// Names that are used, and the first free one for a copy: "fox", "fox-2", "fox-3" …
+class UsedNames {
+ public:
+  void Add(const std::string& name) { used_.insert(name); }
+  // Returns the name for a copy of what has this name, which is used from then on.
+  std::string TakeFor(const std::string& original) {
+    const std::string base = WithoutNumber(original);
+    std::string name = original;
+    int& number = next_number_.try_emplace(base, 2).first->second;
+    while (used_.contains(name)) name = base + "-" + std::to_string(number++);
+    used_.insert(name);
+    return name;
+  }
+
+ private:
+  std::set<std::string, std::less<>> used_;
+  std::map<std::string, int> next_number_;  // of each base, so that many copies take linear time
+};
+
+// Gives each entity a free name, and adds them at the end of the list. Those of one group are in a group of
+// their own, apart from the entities that are there.
 SceneChange AddCopies(const Scene& scene, std::vector<Entity> copies, const std::string& label) {
-  std::set<std::string, std::less<>> used;
-  for (const Entity& entity : scene.entities) used.insert(entity.name);
-  std::map<std::string, int> next_number;  // of each base, so that many copies take linear time
+  UsedNames names, groups;
+  for (const Entity& entity : scene.entities) {
+    names.Add(entity.name);
+    groups.Add(entity.group);
+  }
+  std::map<std::string, std::string> group_of_copies;  // By the group of the originals.
   SceneChange change{label, {}};
   std::size_t index = scene.entities.size();
   for (Entity& copy : copies) {
-    const std::string base = WithoutNumber(copy.name);
-    std::string name = copy.name;
-    int& number = next_number.try_emplace(base, 2).first->second;
-    while (used.contains(name)) name = base + "-" + std::to_string(number++);
-    used.insert(name);
-    copy.name = std::move(name);
+    copy.name = names.TakeFor(copy.name);
+    if (!copy.group.empty()) {
+      const auto [group, is_new] = group_of_copies.try_emplace(copy.group);
+      if (is_new) group->second = groups.TakeFor(copy.group);
+      copy.group = group->second;
+    }
     copy.locked = copy.hidden = false;
     change.entities.push_back({index++, std::nullopt, std::move(copy)});
   }

@@ -22,9 +22,9 @@ namespace docent::content {
 // The entity's name must be unused (Scene::FreeName).
 SceneChange AddEdit(const Scene& scene, Entity entity);
 // Copies of these entities, which may be from another scene, are added under free names. They are neither
-// locked nor hidden.
+// locked nor hidden. Copies from one group are together in a group of their own, whose name is free.
 SceneChange PasteEdit(const Scene& scene, std::vector<Entity> entities);
-// Copies of entities of this scene, each beside its original.
+// Copies of entities of this scene in the same way, each beside its original.
 SceneChange DuplicateEdit(const Scene& scene, const std::vector<std::string>& names);
 SceneChange RemoveEdit(const Scene& scene, const std::vector<std::string>& names);
 

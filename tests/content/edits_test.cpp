@@ -350,6 +350,36 @@ TEST(EditHistory, UndoAndRedoRestoreTheSameScenes) {
   EXPECT_FALSE(history.Redo(&scene)) << "a new edit discards undone edits";
 }
 
+TEST(EditHistory, UndoAndRedoRestoreNoTargetThatIsGone) {
+  Scene scene = ThreeEntities();  // sign-1 leads to the map with the key 7.
+  EditHistory history;
+  history.Do(TargetEdit(scene, "sign-1", "Hall", 9), &scene);
+  history.Do(TargetEdit(scene, "sign-1", "Room", 4), &scene);
+  history.Do(RemoveEdit(scene, {"sign-1", "helmet"}), &scene);
+  for (int i = 0; i < 2; ++i) ASSERT_TRUE(history.Undo(&scene));
+  const auto lead_nowhere = [](std::uint64_t from_key) {
+    return [from_key](Signpost* signpost) {
+      if (signpost->to_key != from_key) return false;
+      LeadNowhere(signpost);
+      return true;
+    };
+  };
+  EXPECT_TRUE(history.RetargetSignposts(lead_nowhere(7)));
+  EXPECT_TRUE(history.RetargetSignposts(lead_nowhere(4)));
+  EXPECT_FALSE(history.RetargetSignposts(lead_nowhere(4))) << "no state leads there any more";
+  const auto target = [&] { return scene.Find("sign-1")->signpost.to_map; };
+  EXPECT_EQ(target(), "Hall");
+  ASSERT_TRUE(history.Undo(&scene));
+  EXPECT_EQ(target(), "");
+  ASSERT_TRUE(history.Redo(&scene));
+  EXPECT_EQ(target(), "Hall");
+  ASSERT_TRUE(history.Redo(&scene));
+  EXPECT_EQ(target(), "");
+  ASSERT_TRUE(history.Redo(&scene));
+  ASSERT_TRUE(history.Undo(&scene));
+  EXPECT_EQ(target(), "") << "as it was removed";
+}
+
 TEST(EditHistory, UndoHasNoLimitInASession) {
   constexpr int kChanges = 5000;
   Scene scene;
@@ -390,6 +420,31 @@ TEST(EditHistory, UndoIsRefusedWhereOthersChangedTheSceneMeanwhile) {
   scene.entities.erase(scene.entities.begin());
   ASSERT_TRUE(history.Undo(&scene));
   EXPECT_THAT(NamesOf(scene), ElementsAre("old fox", "sign-1"));
+}
+
+TEST(Edits, CopiesOfAGroupAreAGroupOfTheirOwn) {
+  const auto in_group = [](Entity entity, const std::string& group) {
+    entity.group = group;
+    return entity;
+  };
+  const auto groups_of = [](const Scene& scene) {
+    std::vector<std::string> groups;
+    for (const Entity& entity : scene.entities) groups.push_back(entity.group);
+    return groups;
+  };
+  Scene scene;
+  scene.entities = {in_group(ModelEntity("helmet"), "group-1"), in_group(SignEntity("sign-1"), "group-1"),
+                    ModelEntity("fox")};
+  ApplyChange(DuplicateEdit(scene, {"helmet", "sign-1", "fox"}), &scene);
+  EXPECT_THAT(groups_of(scene), ElementsAre("group-1", "group-1", "", "group-2", "group-2", ""));
+  // Entities of another map, where the same names of groups are used.
+  ApplyChange(
+      PasteEdit(scene, {in_group(ModelEntity("owl"), "group-2"), in_group(SignEntity("owl's"), "group-2"),
+                        in_group(ModelEntity("lion"), "group-1"), in_group(ModelEntity("hat"), "hats")}),
+      &scene);
+  const std::vector<std::string> groups = groups_of(scene);
+  EXPECT_THAT(std::vector<std::string>(groups.begin() + 6, groups.end()),
+              ElementsAre("group-3", "group-3", "group-4", "hats"));
 }
 
 TEST(Edits, ATextGetsVariantsByLanguage) {
