@@ -107,6 +107,21 @@ void EditHistory::MoveWithAnchor(const std::string& name, const engine::Sim3& mo
   }
 }
 
+bool EditHistory::RetargetSignposts(const std::function<bool(Signpost*)>& retarget) {
+  bool any = false;
+  for (std::vector<SceneChange>* const changes : {&done_, &undone_}) {
+    for (SceneChange& change : *changes) {
+      for (EntityChange& entity : change.entities) {
+        for (std::optional<Entity>* const state : {&entity.before, &entity.after}) {
+          if (!*state || (*state)->kind != Entity::Kind::kSignpost) continue;
+          any = retarget(&(*state)->signpost) || any;
+        }
+      }
+    }
+  }
+  return any;
+}
+
 std::vector<std::shared_ptr<const Asset>> EditHistory::Assets() const {
   std::map<std::string, std::shared_ptr<const Asset>> by_id;
   for (const auto* changes : {&done_, &undone_}) {

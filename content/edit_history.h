@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstddef>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <string>
@@ -58,6 +59,10 @@ class EditHistory {
   // Transforms what is stored of an entity after its anchor has moved in the map. The entity has this name in
   // the scene now; changes of an earlier entity of that name stay as they are.
   void MoveWithAnchor(const std::string& name, const engine::Sim3& motion);
+  // Lets all stored states of signposts lead elsewhere after something has happened to maps, so that undo and
+  // redo restore no target that is gone. `retarget` changes a signpost where it has to, and returns whether
+  // it did. Returns whether it changed any.
+  bool RetargetSignposts(const std::function<bool(Signpost*)>& retarget);
 
   const std::vector<SceneChange>& done() const { return done_; }
   const std::vector<SceneChange>& undone() const { return undone_; }

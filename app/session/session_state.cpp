@@ -86,19 +86,23 @@ std::string SessionState::FreeMapName(const std::string& name) const {
 
 void SessionState::Retarget(std::uint64_t from_key, const std::string& from, std::uint64_t to_key,
                             const std::string& to) {
+  const auto retarget = [&](content::Signpost* signpost) {
+    const bool leads = signpost->to_key != 0 ? signpost->to_key == from_key : signpost->to_map == from;
+    if (!leads) return false;
+    signpost->to_key = to_key;
+    signpost->to_map = to;
+    if (to_key == 0 && to.empty()) content::LeadNowhere(signpost);
+    return true;
+  };
   for (auto& [key, map] : maps) {
     if (!map.Exists() || !maps::MayChangeContent(map.policy)) continue;
     auto scene = std::make_shared<content::Scene>(*map.scene);
-    bool changed = false;
+    bool changed = map.history.RetargetSignposts(retarget);
     for (content::Entity& entity : scene->entities) {
-      content::Signpost& signpost = entity.signpost;
-      const bool leads = signpost.to_key != 0 ? signpost.to_key == from_key : signpost.to_map == from;
-      if (entity.kind != content::Entity::Kind::kSignpost || !leads) continue;
-      signpost.to_key = to_key;
-      signpost.to_map = to;
-      if (to_key == 0 && to.empty()) content::LeadNowhere(&signpost);
-      changed = true;
+      if (entity.kind != content::Entity::Kind::kSignpost) continue;
+      changed = retarget(&entity.signpost) || changed;
     }
+    // The history is saved with the scene.
     if (changed) map.scene = std::move(scene);
   }
 }

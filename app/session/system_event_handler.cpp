@@ -11,6 +11,7 @@
 #include "app/files/text_file.h"
 #include "app/output/engine_text.h"
 #include "app/session/joined_scenes.h"
+#include "maps/library/signposts.h"
 
 namespace docent::app {
 
@@ -46,6 +47,10 @@ maps::MapInfo IdentityOf(const SessionMap& map) {
   info.key = map.key;
   info.name = map.name;
   return info;
+}
+
+bool LeadsTo(const content::Signpost& signpost, const maps::MapInfo& map) {
+  return maps::LeadsTo({signpost.to_key, signpost.to_map}, map);
 }
 
 std::string TextOf(const engine::CalibrationMonitor::Mismatch& mismatch) {
@@ -206,15 +211,27 @@ void SystemEventHandler::AbsorbMap(SessionMap* from, const engine::JoinedMap& jo
   const maps::MapInfo map_into = IdentityOf(*into), map_from = IdentityOf(*from);
   MergeScene(*from->scene, map_into, map_from, joined, scene.get());
   into->scene = std::move(scene);
+  into->history.RetargetSignposts([&](content::Signpost* signpost) {
+    if (!LeadsTo(*signpost, map_into) && !LeadsTo(*signpost, map_from)) return false;
+    content::LeadNowhere(signpost);
+    return true;
+  });
   into->joined_keys.push_back(from->key);
   into->joined_keys.insert(into->joined_keys.end(), from->joined_keys.begin(), from->joined_keys.end());
   from->joined_into = into->key;
   system_.SetPermissions(into->key, into->Permissions());
   for (auto& [key, map] : state_.maps) {
-    if (!map.Exists() || key == into->key) continue;
+    if (!map.Exists() || key == into->key || !maps::MayChangeContent(map.policy)) continue;
     auto other = std::make_shared<content::Scene>(*map.scene);
-    if (maps::MayChangeContent(map.policy) && RedirectSceneSignposts(map_from, map_into, other.get()))
-      map.scene = std::move(other);
+    const bool changed = RedirectSceneSignposts(map_from, map_into, other.get());
+    const bool history_changed = map.history.RetargetSignposts([&](content::Signpost* signpost) {
+      if (!LeadsTo(*signpost, map_from)) return false;
+      signpost->to_map = map_into.name;
+      signpost->to_key = map_into.key;
+      return true;
+    });
+    // The history is saved with the scene.
+    if (changed || history_changed) map.scene = std::move(other);
   }
 }
 

@@ -228,6 +228,27 @@ TEST(LiveJoining, JoinsTwoMapsWhenAPersonAsksForIt) {
   EXPECT_EQ(outcome.maps[0].scene->entities.size(), 1u);
 }
 
+// The same walk, with a signpost in the second map that led to the first one at first.
+TEST(LiveJoining, UndoRestoresNoSignpostThatLeadsToAMapThatWasJoined) {
+  std::vector<int> order;
+  Append(0, 120, &order);
+  const std::size_t second = order.size();
+  Append(120, 30, &order);
+  const std::size_t asked = order.size();
+  Append(30, 90, &order);
+  const SourceRun outcome = RunInOrder(
+      Simulate("loop"), order, Pace::kLockstep, nullptr,
+      {BeforeFrame(second, NewMap{"Annex"}), BeforeFrame(asked - 8, PlaceSignpost{"back", kMiddle, "Hall"}),
+       BeforeFrame(asked - 4, SetSignpostTarget{"sign-1", ""}), BeforeFrame(asked, JoinMap{"Hall"}),
+       BeforeFrame(order.size() - 1, Undo{})});
+  EXPECT_THAT(outcome.map_events, ::testing::Contains(HasSubstr("maps Annex and Hall were joined")));
+  ASSERT_EQ(outcome.maps.size(), 1u) << ::testing::PrintToString(outcome.map_events);
+  ASSERT_EQ(outcome.maps[0].scene->entities.size(), 1u);
+  EXPECT_EQ(outcome.maps[0].scene->entities[0].signpost.text, "back");
+  EXPECT_EQ(outcome.maps[0].scene->entities[0].signpost.to_map, "");
+  EXPECT_EQ(outcome.maps[0].scene->entities[0].signpost.to_key, 0u);
+}
+
 TEST(LiveJoining, SaysWhyMapsThatAPersonAskedForAreNotJoined) {
   const auto simulation = Simulate("desks:2");
   std::vector<int> order;

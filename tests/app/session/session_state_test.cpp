@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include "content/edits.h"
 #include "engine/base/error.h"
 
 namespace docent::app {
@@ -70,6 +71,26 @@ TEST(SessionState, RetargetsSignpostsByKeyAndByNameOnlyWithoutKey) {
   }
   EXPECT_EQ(SignpostIn(state, 3).to_key, 8U);
   EXPECT_EQ(SignpostIn(state, 3).to_map, "Tower");
+}
+
+TEST(SessionState, UndoRestoresNoSignpostToAMapThatIsGoneOrHasAnotherName) {
+  SessionState state({});
+  SessionMap& map = state.AddMap(1, "Hall");
+  auto scene = std::make_shared<content::Scene>(*SignpostScene(7, "Tower"));
+  map.history.Do(content::TargetEdit(*scene, "sign-1", "Yard", 8), scene.get());
+  map.history.Do(content::RemoveEdit(*scene, {"sign-1"}), scene.get());
+  map.scene = scene;
+  const auto saved = map.saved_scene = map.scene;
+  state.Retarget(7, "Tower", 0, "");
+  EXPECT_NE(map.scene, saved) << "the history is saved with the scene";
+  state.Retarget(8, "Yard", 8, "Court");
+  content::Scene undone = *map.scene;
+  ASSERT_TRUE(map.history.Undo(&undone));
+  EXPECT_EQ(undone.entities.front().signpost.to_key, 8U);
+  EXPECT_EQ(undone.entities.front().signpost.to_map, "Court");
+  ASSERT_TRUE(map.history.Undo(&undone));
+  EXPECT_EQ(undone.entities.front().signpost.to_key, 0U);
+  EXPECT_EQ(undone.entities.front().signpost.to_map, "");
 }
 
 TEST(SessionState, LeavesScenesThatMayNotOrNeedNotChange) {
