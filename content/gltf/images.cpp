@@ -2,9 +2,14 @@
 #include "content/gltf/images.h"
 
 #include <tiny_gltf.h>
+#include <zlib.h>
 
 #include <algorithm>
 #include <array>
+#include <memory>
+#include <new>
+#include <string_view>
+#include <vector>
 
 #include "content/gltf/json.h"
 
@@ -13,9 +18,14 @@ namespace {
 
 constexpr std::array<std::uint8_t, 8> kPngSignature = {0x89, 'P', 'N', 'G', '\r', '\n', 0x1A, '\n'};
 
-int BigEndian(std::span<const std::uint8_t> bytes, std::size_t offset, int length) {
+std::uint32_t BigEndian(std::span<const std::uint8_t> bytes, std::size_t offset, int length) {
   std::uint32_t value = 0;
   for (int i = 0; i < length; ++i) value = value << 8 | bytes[offset + static_cast<std::size_t>(i)];
+  return value;
+}
+
+// The side of an image in pixels; 0 if it cannot be one.
+int SideOf(std::uint32_t value) {
   return value > 0x7FFFFFFF ? 0 : static_cast<int>(value);
 }
 
@@ -28,17 +38,95 @@ bool IsJpeg(std::span<const std::uint8_t> bytes) {
   return bytes.size() >= 3 && bytes[0] == 0xFF && bytes[1] == 0xD8;
 }
 
-// Whether all chunks up to the last one, IEND, are there (ISO/IEC 15948, 5.3: a length, a type, the data and
-// a checksum).
+struct PngChunk {
+  std::string_view type;
+  std::span<const std::uint8_t> data;
+};
+
+// Returns the chunk at *offset, and moves that to the next one (ISO/IEC 15948, 5.3: a length, a type, the
+// data and a checksum). Empty at the end, and where the chunk is cut off.
+std::optional<PngChunk> NextChunk(std::span<const std::uint8_t> bytes, std::size_t* offset) {
+  constexpr std::size_t kBeforeData = 8, kChecksum = 4;
+  const std::span<const std::uint8_t> rest = bytes.subspan(*offset);
+  if (rest.size() < kBeforeData + kChecksum) return std::nullopt;
+  const std::size_t length = BigEndian(rest, 0, 4);
+  if (length > rest.size() - kBeforeData - kChecksum) return std::nullopt;
+  *offset += kBeforeData + length + kChecksum;
+  return PngChunk{{reinterpret_cast<const char*>(rest.data()) + 4, 4}, rest.subspan(kBeforeData, length)};
+}
+
+// Whether all chunks up to the last one, IEND, are there.
 bool IsCompletePng(std::span<const std::uint8_t> bytes) {
-  constexpr std::uint64_t kChunkBytes = 12;
-  std::uint64_t offset = kPngSignature.size();
-  while (offset + kChunkBytes <= bytes.size()) {
-    const auto at = static_cast<std::size_t>(offset);
-    const bool ends = std::equal(bytes.begin() + static_cast<std::ptrdiff_t>(at) + 4,
-                                 bytes.begin() + static_cast<std::ptrdiff_t>(at) + 8, "IEND");
-    offset += kChunkBytes + static_cast<std::uint64_t>(BigEndian(bytes, at, 4));
-    if (ends) return offset <= bytes.size();
+  std::size_t offset = kPngSignature.size();
+  while (const auto chunk = NextChunk(bytes, &offset)) {
+    if (chunk->type == "IEND") return true;
+  }
+  return false;
+}
+
+// How many bytes the data of a PNG with this header may inflate to: twice as many as its rows have, and a few
+// more, because an interlaced image has more rows, and some programs write zeros behind the last one. 0 if
+// the header is not valid.
+std::uint64_t MostPngData(std::span<const std::uint8_t> header) {
+  constexpr std::size_t kHeaderBytes = 13;
+  constexpr std::uint64_t kMaxDepth = 16, kFewBytes = 65'536;
+  constexpr std::array<std::uint64_t, 7> kChannels = {1, 0, 3, 1, 2, 0, 4};  // By the type of colour.
+  if (header.size() != kHeaderBytes) return 0;
+  const std::uint64_t width = BigEndian(header, 0, 4), height = BigEndian(header, 4, 4);
+  const std::uint64_t depth = header[8], type = header[9];
+  if (depth > kMaxDepth || type >= kChannels.size()) return 0;
+  const std::uint64_t row = 1 + (width * kChannels[type] * depth + 7) / 8;  // With the number of its filter.
+  return 2 * height * row + kFewBytes;
+}
+
+// Inflates the data of a PNG piece by piece.
+class PngInflater {
+ public:
+  PngInflater() {
+    if (inflateInit(&stream_) != Z_OK) throw std::bad_alloc();
+    inflateValidate(&stream_, 0);  // stb does not look at the checksum either.
+  }
+  ~PngInflater() { inflateEnd(&stream_); }
+  PngInflater(const PngInflater&) = delete;
+  PngInflater& operator=(const PngInflater&) = delete;
+
+  // Goes on with the data of the next chunk. Returns false if they are damaged or inflate to more bytes than
+  // `most`, counted from the first chunk. What follows the end of the data does not matter.
+  bool Add(std::span<const std::uint8_t> data, std::uint64_t most) {
+    stream_.next_in = const_cast<Bytef*>(data.data());
+    stream_.avail_in = static_cast<uInt>(data.size());
+    do {
+      if (has_ended_) return true;
+      stream_.next_out = buffer_.data();
+      stream_.avail_out = static_cast<uInt>(buffer_.size());
+      const int result = inflate(&stream_, Z_NO_FLUSH);
+      has_ended_ = result == Z_STREAM_END;
+      // Z_BUF_ERROR: nothing is left to be done with this chunk.
+      if (result != Z_OK && result != Z_STREAM_END && result != Z_BUF_ERROR) return false;
+      if (stream_.total_out > most) return false;
+    } while (stream_.avail_in > 0 || stream_.avail_out == 0);
+    return true;
+  }
+
+ private:
+  z_stream stream_{};
+  std::vector<Bytef> buffer_ = std::vector<Bytef>(65'536);
+  bool has_ended_ = false;
+};
+
+// Whether the data of a PNG fit its header. stb inflates them to the end, whatever the header says, so that a
+// small file could take gigabytes.
+bool HasPlausibleData(std::span<const std::uint8_t> bytes) {
+  std::size_t offset = kPngSignature.size();
+  const auto header = NextChunk(bytes, &offset);
+  if (!header || header->type != "IHDR") return false;
+  const std::uint64_t most = MostPngData(header->data);
+  PngInflater inflater;
+  while (const auto chunk = NextChunk(bytes, &offset)) {
+    if (chunk->type == "IEND") return true;
+    // A variant of the format, whose data stb reads in another way.
+    if (chunk->type == "CgBI") return false;
+    if (chunk->type == "IDAT" && !inflater.Add(chunk->data, most)) return false;
   }
   return false;
 }
@@ -62,9 +150,9 @@ std::optional<ImageSize> ReadJpegSize(std::span<const std::uint8_t> bytes) {
         marker >= 0xC0 && marker <= 0xCF && marker != 0xC4 && marker != 0xC8 && marker != 0xCC;
     if (is_frame) {
       if (offset + 9 > bytes.size()) return std::nullopt;
-      return ImageSize{BigEndian(bytes, offset + 7, 2), BigEndian(bytes, offset + 5, 2)};
+      return ImageSize{SideOf(BigEndian(bytes, offset + 7, 2)), SideOf(BigEndian(bytes, offset + 5, 2))};
     }
-    offset += 2 + static_cast<std::size_t>(BigEndian(bytes, offset + 2, 2));
+    offset += 2 + std::size_t{BigEndian(bytes, offset + 2, 2)};
   }
   return std::nullopt;
 }
@@ -90,7 +178,7 @@ Image ToImage(const tinygltf::Image& decoded) {
 std::optional<ImageSize> ReadImageSize(std::span<const std::uint8_t> bytes) {
   if (IsPng(bytes)) {
     if (bytes.size() < 33) return std::nullopt;
-    return ImageSize{BigEndian(bytes, 16, 4), BigEndian(bytes, 20, 4)};
+    return ImageSize{SideOf(BigEndian(bytes, 16, 4)), SideOf(BigEndian(bytes, 20, 4))};
   }
   return IsJpeg(bytes) ? ReadJpegSize(bytes) : std::nullopt;
 }
@@ -122,6 +210,7 @@ std::optional<Image> DecodeImage(const std::string& file, const std::string& pla
                std::to_string(limits.max_image_pixels) + " pixels.");
   }
   *pixels_left -= pixels;
+  if (IsPng(bytes) && !HasPlausibleData(bytes)) return std::nullopt;
   tinygltf::Image decoded;
   std::string fault, warning;
   // Without options, stb is asked for four channels.

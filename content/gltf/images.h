@@ -10,7 +10,8 @@
 #include "content/model.h"
 
 // Decodes the images of a model: PNG and JPEG (the only formats of core glTF), with tinygltf's stb_image. The
-// size in an image's header is checked against the limits before it is decoded.
+// size in an image's header is checked against the limits before it is decoded, and the data of a PNG against
+// that size.
 namespace docent::content {
 
 struct ImageSize {
@@ -25,8 +26,9 @@ std::optional<ImageSize> ReadImageSize(std::span<const std::uint8_t> bytes);
 // of a PNG, are complete. Decodes nothing.
 std::optional<std::string> ImageFault(std::span<const std::uint8_t> bytes);
 
-// Decodes one image; empty if it is damaged. `place` is used in messages. `pixels_left` is the remaining
-// budget of the model, which is reduced. Throws Error when the image is too large.
+// Decodes one image; empty if it is damaged, or if the data of a PNG inflate to far more bytes than its
+// header says. `place` is used in messages. `pixels_left` is the remaining budget of the model, which is
+// reduced. Throws Error when the image is too large.
 std::optional<Image> DecodeImage(const std::string& file, const std::string& place,
                                  std::span<const std::uint8_t> bytes, const LoadLimits& limits,
                                  std::uint64_t* pixels_left);
