@@ -7,10 +7,15 @@
 namespace docent::content {
 
 // The node of a skinned mesh does not move it (§3.7.3.3).
-std::vector<glm::mat4> JointMatrices(const Skin& skin, const std::vector<glm::mat4>& nodes) {
-  std::vector<glm::mat4> matrices(skin.joints.size());
-  for (std::size_t i = 0; i < matrices.size(); ++i) {
-    matrices[i] = nodes[static_cast<std::size_t>(skin.joints[i])] * skin.inverse_bind[i];
+const std::vector<glm::mat4>& JointMatrices::Of(const Node& node) {
+  if (node.skin < 0) return none_;
+  const auto index = static_cast<std::size_t>(node.skin);
+  const Skin& skin = model_.skins[index];
+  std::vector<glm::mat4>& matrices = by_skin_[index];
+  if (!matrices.empty()) return matrices;
+  matrices.reserve(skin.joints.size());
+  for (std::size_t i = 0; i < skin.joints.size(); ++i) {
+    matrices.push_back(nodes_[static_cast<std::size_t>(skin.joints[i])] * skin.inverse_bind[i]);
   }
   return matrices;
 }
@@ -26,13 +31,13 @@ glm::mat4 RestMatrix(const Vertex& vertex, const std::vector<glm::mat4>& joints,
 
 std::optional<std::pair<glm::vec3, glm::vec3>> RestBounds(const Model& model) {
   const std::vector<glm::mat4> nodes = NodeMatrices(model, -1, 0);
+  JointMatrices skins(model, nodes);
   glm::vec3 least(std::numeric_limits<float>::max()), most(std::numeric_limits<float>::lowest());
   bool any = false;
   for (std::size_t i = 0; i < model.nodes.size(); ++i) {
     const Node& node = model.nodes[i];
     if (node.mesh < 0) continue;
-    std::vector<glm::mat4> joints;
-    if (node.skin >= 0) joints = JointMatrices(model.skins[static_cast<std::size_t>(node.skin)], nodes);
+    const std::vector<glm::mat4>& joints = skins.Of(node);
     for (const Primitive& primitive : model.meshes[static_cast<std::size_t>(node.mesh)].primitives) {
       for (const Vertex& vertex : primitive.vertices) {
         const glm::vec3 position(RestMatrix(vertex, joints, nodes[i]) * glm::vec4(vertex.position, 1));

@@ -13,9 +13,23 @@ namespace docent::content {
 // corners are zero when it shows nothing. Empty when a vertex is outside the range of float.
 std::optional<std::pair<glm::vec3, glm::vec3>> RestBounds(const Model& model);
 
-// The matrices model_from_vertex of the joints of a skin, for the matrices of the model's nodes
-// (NodeMatrices).
-std::vector<glm::mat4> JointMatrices(const Skin& skin, const std::vector<glm::mat4>& nodes);
+// The matrices model_from_vertex of the joints of a model's skins, for the matrices of its nodes
+// (NodeMatrices). Those of a skin are computed once, however many nodes it is used by. Both arguments must
+// outlive this. One thread.
+class JointMatrices {
+ public:
+  JointMatrices(const Model& model, const std::vector<glm::mat4>& nodes)
+      : model_(model), nodes_(nodes), by_skin_(model.skins.size()) {}
+
+  // Of the skin of a node; empty without one.
+  const std::vector<glm::mat4>& Of(const Node& node);
+
+ private:
+  const Model& model_;
+  const std::vector<glm::mat4>& nodes_;
+  std::vector<std::vector<glm::mat4>> by_skin_;  // Empty until they are asked for.
+  const std::vector<glm::mat4> none_;
+};
 
 // The matrix that takes a vertex of a node's mesh to the model: that of its joints, if it has any, else that
 // of the node.

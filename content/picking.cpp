@@ -7,6 +7,8 @@
 #include <limits>
 #include <vector>
 
+#include "content/model_bounds.h"
+
 namespace docent::content {
 namespace {
 
@@ -24,17 +26,9 @@ Ray RayInModel(const Ray& ray, const engine::Sim3& map_from_model) {
   return {model_from_map * ray.origin, model_from_map.scale * (model_from_map.rotation * ray.direction)};
 }
 
-// The positions of a primitive's vertices in model axes.
-std::vector<Eigen::Vector3d> PlacedVertices(const Model& model, const Node& node, const Primitive& primitive,
-                                            const glm::mat4& model_from_node,
-                                            const std::vector<glm::mat4>& nodes) {
-  std::vector<glm::mat4> joints;
-  if (node.skin >= 0) {
-    const Skin& skin = model.skins[static_cast<std::size_t>(node.skin)];
-    for (std::size_t i = 0; i < skin.joints.size(); ++i)
-      joints.push_back(nodes[static_cast<std::size_t>(skin.joints[i])] *
-                       (i < skin.inverse_bind.size() ? skin.inverse_bind[i] : glm::mat4(1.0f)));
-  }
+// The positions of a primitive's vertices in model axes. `joints`: of the skin of its node, if it has one.
+std::vector<Eigen::Vector3d> PlacedVertices(const Primitive& primitive, const glm::mat4& model_from_node,
+                                            const std::vector<glm::mat4>& joints) {
   std::vector<Eigen::Vector3d> places;
   places.reserve(primitive.vertices.size());
   for (const Vertex& vertex : primitive.vertices) {
@@ -99,6 +93,7 @@ std::optional<double> IntersectModel(const Ray& ray_in_map, const Model& model,
   if (!moves && !IntersectBox(ray, VectorFrom(model.bounds_min), VectorFrom(model.bounds_max)))
     return std::nullopt;
   const std::vector<glm::mat4> nodes = NodeMatrices(model, moves ? animation : -1, seconds);
+  JointMatrices skins(model, nodes);
   std::optional<double> nearest;
   std::vector<int> open(model.roots.begin(), model.roots.end());
   while (!open.empty()) {
@@ -108,7 +103,7 @@ std::optional<double> IntersectModel(const Ray& ray_in_map, const Model& model,
     open.insert(open.end(), node.children.begin(), node.children.end());
     if (node.mesh < 0) continue;
     for (const Primitive& primitive : model.meshes[static_cast<std::size_t>(node.mesh)].primitives) {
-      const auto places = PlacedVertices(model, node, primitive, nodes[index], nodes);
+      const auto places = PlacedVertices(primitive, nodes[index], skins.Of(node));
       for (std::size_t i = 0; i + 2 < primitive.indices.size(); i += 3) {
         const auto distance =
             IntersectTriangle(ray, places[primitive.indices[i]], places[primitive.indices[i + 1]],

@@ -177,12 +177,11 @@ std::shared_ptr<const Model> Warped(const Model& model, const Warp& warp) {
   warped->textures = model.textures;
   warped->materials = model.materials;
   const std::vector<glm::mat4> nodes = NodeMatrices(model, -1, 0);
+  JointMatrices skins(model, nodes);
   for (std::size_t i = 0; i < model.nodes.size(); ++i) {
     const Node& node = model.nodes[i];
     if (node.mesh < 0) continue;
-    const std::vector<glm::mat4> joints =
-        node.skin >= 0 ? JointMatrices(model.skins[static_cast<std::size_t>(node.skin)], nodes)
-                       : std::vector<glm::mat4>();
+    const std::vector<glm::mat4>& joints = skins.Of(node);
     Mesh mesh = model.meshes[static_cast<std::size_t>(node.mesh)];
     for (Primitive& primitive : mesh.primitives) {
       for (Vertex& vertex : primitive.vertices)

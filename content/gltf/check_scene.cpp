@@ -60,10 +60,10 @@ bool HasAttributeFormat(const std::string& name, const Json& accessor, bool quan
   return true;  // An application-specific attribute, which is not read.
 }
 
-void CheckPrimitive(std::string_view file, const Json& root, const Json& primitive,
+// `quantized`: whether the file uses KHR_mesh_quantization.
+void CheckPrimitive(std::string_view file, const Json& root, const Json& primitive, bool quantized,
                     const std::string& place) {
   const Json& attributes = primitive["attributes"];
-  const bool quantized = UsesExtension(root, "KHR_mesh_quantization");
   const std::uint64_t count = AccessorAt(root, attributes.begin().value())["count"].get<std::uint64_t>();
   for (const auto& [name, index] : attributes.items()) {
     const Json& accessor = AccessorAt(root, index);
@@ -165,10 +165,12 @@ void CheckChannel(std::string_view file, const Json& root, const Json& animation
 
 void CheckMeshes(std::string_view file, const Json& root) {
   const Json& meshes = ArrayOf(root, "meshes");
+  // Once for the whole file, which may list very many extensions.
+  const bool quantized = UsesExtension(root, "KHR_mesh_quantization");
   for (std::size_t i = 0; i < meshes.size(); ++i) {
     const Json& primitives = meshes[i]["primitives"];
     for (std::size_t k = 0; k < primitives.size(); ++k) {
-      CheckPrimitive(file, root, primitives[k], Place("meshes", i) + "." + Place("primitives", k));
+      CheckPrimitive(file, root, primitives[k], quantized, Place("meshes", i) + "." + Place("primitives", k));
     }
   }
 }

@@ -3,10 +3,12 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <chrono>
 #include <filesystem>
 #include <fstream>
 
 #include "content/asset.h"
+#include "content/gltf/check.h"
 #include "content/gltf/images.h"
 #include "content/gltf/resources.h"
 #include "tests/content/make_gltf.h"
@@ -205,6 +207,23 @@ TEST(HostileGltf, SmallFilesThatUnrollToHugeMeshesExceedTheLimits) {
   limits.max_drawn_indices = 270;
   EXPECT_THAT(file.Refusal(limits), HasSubstr("more than 90 triangles"));
   EXPECT_EQ(file.Refusal(), "");
+}
+
+TEST(HostileGltf, ManyExtensionsAreNotSearchedForEachOfManyPrimitives) {
+  constexpr int kMany = 60'000;
+  nlohmann::json root;
+  root["accessors"] = {{{"componentType", 5126}, {"type", "VEC3"}, {"count", 3}}};
+  root["extensionsUsed"] = nlohmann::json::array();
+  nlohmann::json primitives = nlohmann::json::array();
+  for (int i = 0; i < kMany; ++i) {
+    root["extensionsUsed"].push_back("KHR_mesh_" + std::to_string(i));
+    primitives.push_back({{"attributes", {{"POSITION", 0}}}});
+  }
+  root["meshes"] = nlohmann::json::array();
+  root["meshes"].push_back({{"primitives", std::move(primitives)}});
+  const auto begin = std::chrono::steady_clock::now();
+  CheckMeshes("test.glb", root);
+  EXPECT_LT(std::chrono::steady_clock::now() - begin, std::chrono::seconds(5));
 }
 
 TEST(HostileGltf, UnsupportedRequiredExtensionsAreNamed) {
