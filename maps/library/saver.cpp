@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <chrono>
 #include <utility>
+#include <vector>
 
 #include "engine/base/thread_priority.h"
 
@@ -12,6 +13,14 @@ namespace docent::maps {
 namespace {
 
 constexpr std::chrono::milliseconds kMaintenanceInterval{250};
+
+// Adds estimates of lenses. A newer one replaces that of the same camera.
+void MergeLenses(std::vector<StoredLens> newer, std::vector<StoredLens>* lenses) {
+  for (StoredLens& lens : newer) {
+    std::erase_if(*lenses, [&](const StoredLens& older) { return older.camera == lens.camera; });
+    lenses->push_back(std::move(lens));
+  }
+}
 
 }  // namespace
 
@@ -53,6 +62,7 @@ void Saver::Submit(MapRecord record) {
       if (record.scene) place->scene = std::move(record.scene);
       place->joined_keys.insert(place->joined_keys.end(), record.joined_keys.begin(),
                                 record.joined_keys.end());
+      MergeLenses(std::move(record.lenses), &place->lenses);
     } else {
       waiting_.push_back(std::move(record));
     }

@@ -19,11 +19,11 @@
 namespace docent::maps {
 
 // Saves maps on a separate thread, so that tracking and drawing never wait for the disk. Requests wait in a
-// short queue with one entry per map: a newer snapshot or scene replaces one that is not written yet, and
-// entries of maps that were joined into another one (MapRecord::joined_keys) are dropped. The caller decides
-// when to save. Maintenance of the library runs on a second thread, which takes little processor time from
-// the others (LowerThreadPriority). Thread-safe. A failed save does not stop the others: its exception is
-// kept for TakeError, and nothing that was saved before is lost.
+// short queue with one entry per map: a newer snapshot, scene or estimate of a lens replaces one that is not
+// written yet, and entries of maps that were joined into another one (MapRecord::joined_keys) are dropped.
+// The caller decides when to save. Maintenance of the library runs on a second thread, which takes little
+// processor time from the others (LowerThreadPriority). Thread-safe. A failed save does not stop the others:
+// its exception is kept for TakeError, and nothing that was saved before is lost.
 class Saver {
  public:
   // Told of each record that is on disk, on the saver's thread.

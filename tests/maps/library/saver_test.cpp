@@ -13,6 +13,7 @@
 namespace docent::maps {
 namespace {
 
+using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 
 class SaverTest : public ::testing::Test {
@@ -69,6 +70,31 @@ TEST_F(SaverTest, TheLatestSnapshotIsSavedAndAnEarlierSceneIsNotLost) {
   EXPECT_EQ(library_->Find(b).name, "Door");
   EXPECT_EQ(FirstDifference(*library_->Load(b).snapshot, *last), "");
   EXPECT_EQ(FirstDifference(library_->LoadScene(b), *scene), "");
+}
+
+TEST_F(SaverTest, OfWaitingEstimatesOfALensTheLatestIsSaved) {
+  const auto lens = [](const std::string& camera, double focal_px) {
+    return StoredLens{camera,
+                      engine::CameraModel(engine::LensModel::kRadialTangential,
+                                          {640, 480, focal_px, focal_px, 320, 240}, {0, 0, 0, 0, 0}),
+                      0.01, false};
+  };
+  const std::uint64_t a = library_->NewKey(), b = library_->NewKey();
+  Saver saver(&*library_);
+  hold_ = true;
+  saver.Submit({a, "Busy", Policy::kOpen, MakeSampleMap(1), nullptr});
+  WaitUntilASaveRuns();
+  MapRecord record{b, "Door", Policy::kOpen, MakeSampleMap(2), nullptr};
+  record.lenses = {lens("left", 500), lens("right", 500)};
+  saver.Submit(record);
+  record.lenses = {lens("left", 510)};
+  saver.Submit(record);
+  record.lenses = {};
+  saver.Submit(record);
+  hold_ = false;
+  saver.Flush();
+  EXPECT_EQ(saver.TakeError(), nullptr);
+  EXPECT_THAT(library_->Lenses(), ElementsAre(lens("left", 510), lens("right", 500)));
 }
 
 TEST_F(SaverTest, DoesNotRestoreAMapThatWasJoinedIntoAnother) {
