@@ -298,7 +298,8 @@ bool Library::Save(const MapRecord& record) {
   impl_->Write([&] {
     const std::optional<MapInfo> info =
         record.key == 0 ? std::nullopt : ReadMapRow(impl_->database(), record.key);
-    wanted = !record.expected_revision || (info && info->revision == *record.expected_revision);
+    wanted = (!record.expected_revision || (info && info->revision == *record.expected_revision)) &&
+             (!record.expected || info == *record.expected);
     if (!wanted) return false;
     MapInfo place;
     place.key = record.key;

@@ -144,7 +144,7 @@ Optimization OptimizeMap(Library* library, std::uint64_t key, const std::atomic<
   record.key = key;
   record.name = stored.info.name;
   record.snapshot = std::move(adjusted.snapshot);
-  record.expected_revision = stored.info.revision;
+  record.expected = stored.info;
   if (move_scene) {
     StoredContent content{std::make_shared<const SceneRecord>(stored.scene), nullptr};
     try {

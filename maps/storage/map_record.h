@@ -40,6 +40,22 @@ inline constexpr std::size_t kMaxHistoryTextBytes = std::size_t{1} << 20;
 // Largest size of the assets that nothing but the undo history of a map uses, together.
 inline constexpr std::size_t kMaxHistoryAssetBytes = std::size_t{64} << 20;
 
+// An entry of the list of maps, read without points or images.
+struct MapInfo {
+  std::uint64_t key = 0;                                      // Unique in the library, never reused.
+  std::string name;                                           // Unique in the library.
+  Policy policy = Policy::kOpen;                              // What may be changed.
+  WallTime created{};                                         // Time of the first save.
+  WallTime modified{};                                        // Last change of keyframes, points or content.
+  std::uint64_t revision = 0;                                 // Of the stored snapshot.
+  std::uint32_t next_keyframe = 0, next_point = 0;            // The next ids; see engine::MapSnapshot.
+  std::uint64_t keyframes = 0, points = 0, observations = 0;  // The numbers of each.
+  std::optional<Bounds> bounds;  // Of a map that is or was bounded; see policy.h.
+
+  // Whether all fields are equal.
+  bool operator==(const MapInfo& other) const = default;
+};
+
 // The input of one save.
 struct MapRecord {
   std::uint64_t key = 0;  // From Library::NewKey or a loaded map.
@@ -62,22 +78,9 @@ struct MapRecord {
   // The changes of the scene that can be undone. Null keeps the stored ones if the scene stays the same;
   // those of another scene are removed. An empty text removes them.
   std::shared_ptr<const SceneRecord> history = nullptr;
-};
-
-// An entry of the list of maps, read without points or images.
-struct MapInfo {
-  std::uint64_t key = 0;                                      // Unique in the library, never reused.
-  std::string name;                                           // Unique in the library.
-  Policy policy = Policy::kOpen;                              // What may be changed.
-  WallTime created{};                                         // Time of the first save.
-  WallTime modified{};                                        // Last change of keyframes, points or content.
-  std::uint64_t revision = 0;                                 // Of the stored snapshot.
-  std::uint32_t next_keyframe = 0, next_point = 0;            // The next ids; see engine::MapSnapshot.
-  std::uint64_t keyframes = 0, points = 0, observations = 0;  // The numbers of each.
-  std::optional<Bounds> bounds;  // Of a map that is or was bounded; see policy.h.
-
-  // Whether all fields are equal.
-  bool operator==(const MapInfo& other) const = default;
+  // If set, the save only succeeds if the stored map still has this entry in the list of maps. A change of
+  // its content by another program, which leaves the revision as it is, changes the time in the entry.
+  std::optional<MapInfo> expected = std::nullopt;
 };
 
 // The result of joining two maps (see joining.h).

@@ -102,6 +102,24 @@ TEST(Maintenance, KeepsChangesOfAnotherProgram) {
   EXPECT_EQ(FirstDifference(*other->Load(key).snapshot, *theirs), "");
 }
 
+TEST(Maintenance, KeepsContentThatAnotherProgramSavesMeanwhile) {
+  const TemporaryFolder folder;
+  auto crooked = std::make_shared<engine::MapSnapshot>(*MakeTrueMap());
+  for (engine::MapPoint& point : crooked->points) point.point_in_map.z() += point.id % 2 == 0 ? 0.02 : -0.02;
+  Library library = Library::Open(folder / "a.docent", Access::kReadWrite, CreateIfMissing::kYes);
+  const std::uint64_t key = library.NewKey();
+  library.Save({key, "Desk", Policy::kOpen, crooked, MakeTextScene("ours")});
+  Library other = OpenToWrite(folder / "a.docent");
+  // Content moves after the map was read and before the result is saved.
+  const auto move = [&](const StoredContent&, const engine::MapSnapshot&, const engine::MapSnapshot&) {
+    other.Save({key, "", Policy::kOpen, nullptr, MakeTextScene("theirs")});
+    return StoredContent{MakeTextScene("ours, moved"), nullptr};
+  };
+  EXPECT_EQ(OptimizeMap(&library, key, nullptr, move).outcome, Optimization::Outcome::kChangedMeanwhile);
+  EXPECT_EQ(other.LoadScene(key).text, "theirs");
+  EXPECT_EQ(FirstDifference(*other.Load(key).snapshot, *crooked), "");
+}
+
 TEST(Maintenance, CullsRedundantKeyframesOfAnIdleMap) {
   auto map = std::make_shared<engine::MapSnapshot>(*MakeTrueMap(12, 0.02));
   ASSERT_EQ(engine::Validate(*map), "");
