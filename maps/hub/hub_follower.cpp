@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <exception>
+#include <optional>
 #include <thread>
 #include <utility>
 
@@ -16,6 +17,8 @@ constexpr std::chrono::milliseconds kListenStep(200);  // Until a stop is notice
 // A change is told at once; this is for those that were made while the connection was being set up again.
 constexpr std::chrono::seconds kAskAnyway(20);
 constexpr std::chrono::milliseconds kFirstDelay(500), kLongestDelay(30'000);  // Before the next attempt.
+// The same for a map that could not be pulled, of which all images may have to be decoded again.
+constexpr std::chrono::milliseconds kLongestDelayOfMaps(300'000);
 
 // Returns early when a stop is requested.
 void SleepUnlessStopped(std::chrono::milliseconds time, const std::stop_token& stop) {
@@ -37,25 +40,42 @@ void HubFollower::Tell(const std::string& sentence) {
   if (callbacks_.told) callbacks_.told(sentence);
 }
 
+SyncReport HubFollower::PullAndTell() {
+  SyncReport report = Pull(options_);
+  if (!is_connected_) Tell("the hub is reached, and the library follows it");
+  is_connected_ = true;
+  for (const std::string& line : report.lines) {
+    if (!lines_.contains(line) && callbacks_.told) callbacks_.told(line);
+  }
+  lines_ = {report.lines.begin(), report.lines.end()};
+  if (!report.changed_keys.empty() && callbacks_.pulled) callbacks_.pulled(report);
+  return report;
+}
+
 void HubFollower::FollowConnected(const std::stop_token& stop) {
+  using Clock = std::chrono::steady_clock;
   Hub hub(options_.hub);
   hub.Listen();
   std::int64_t seen = -1;
-  auto asked = std::chrono::steady_clock::now();
+  std::chrono::milliseconds delay = kFirstDelay;
+  std::optional<Clock::time_point> retry;  // What could not be pulled is tried again then.
   while (!stop.stop_requested()) {
     // Before the pull, so that a change during it is not missed.
     const std::int64_t last = hub.LastChange();
-    if (last != seen) {
-      const SyncReport report = Pull(options_);
-      // What waits for an authoring session to end is tried again.
-      seen = report.waiting > 0 ? -1 : last;
-      if (!is_connected_) Tell("the hub is reached, and the library follows it");
-      is_connected_ = true;
-      if (!report.changed_keys.empty() && callbacks_.pulled) callbacks_.pulled(report);
+    if (last != seen || (retry && Clock::now() >= *retry)) {
+      if (last != seen) delay = kFirstDelay;
+      seen = last;
+      const SyncReport report = PullAndTell();
+      retry.reset();
+      if (report.problems > 0) {
+        retry = Clock::now() + delay;
+        // Whether an authoring session has ended is asked more often, because that costs little.
+        delay = std::min<std::chrono::milliseconds>(2 * delay,
+                                                    report.waiting > 0 ? kAskAnyway : kLongestDelayOfMaps);
+      }
     }
-    asked = std::chrono::steady_clock::now();
-    while (!stop.stop_requested() && !hub.WaitForChange(kListenStep) &&
-           std::chrono::steady_clock::now() < asked + kAskAnyway) {
+    const auto next = std::min(Clock::now() + kAskAnyway, retry.value_or(Clock::time_point::max()));
+    while (!stop.stop_requested() && !hub.WaitForChange(kListenStep) && Clock::now() < next) {
     }
   }
 }

@@ -119,6 +119,28 @@ TEST_F(HubFollow, AHubThatIsGoneIsFoundAgain) {
   EXPECT_TRUE(WaitUntil([&] { return TextOnB() == "after the cut"; }, 10s)) << told.All();
 }
 
+TEST_F(HubFollow, AMapThatCouldNotBePulledIsToldOnceAndTriedAgain) {
+  ShareMap();
+  Told told;
+  HubFollower follower(SampleSync(Url(AddUser("vera", "visitor")), folder_ / "b"), told.Callbacks());
+  ASSERT_TRUE(WaitUntil([&] { return told.All().find("is reached") != std::string::npos; }, 10s))
+      << told.All();
+  RunHubSql(Url(), "REVOKE SELECT ON docent.blobs FROM docent_visitor");
+  PushText("withheld");
+  EXPECT_TRUE(WaitUntil([&] { return told.All().find("'Desk' was not updated") != std::string::npos; }, 10s))
+      << told.All();
+  std::this_thread::sleep_for(1s);  // It is tried again meanwhile.
+  EXPECT_EQ(TextOnB(), "Hello");
+  RunHubSql(Url(), "GRANT SELECT ON docent.blobs TO docent_visitor");
+  EXPECT_TRUE(WaitUntil([&] { return TextOnB() == "withheld"; }, 15s))
+      << "nothing on the hub has changed since";
+  EXPECT_TRUE(
+      WaitUntil([&] { return told.All().find("was updated to revision 2") != std::string::npos; }, 2s))
+      << told.All();
+  const std::string all = told.All();
+  EXPECT_EQ(all.find("was not updated"), all.rfind("was not updated")) << all;
+}
+
 TEST_F(HubFollow, AFollowerEndsWithoutAHub) {
   ShareMap();
   Told told;
