@@ -51,7 +51,10 @@ bool IsInUse(const std::string& url) {
   HubConnection connection(url);
   bool is_used = false;
   connection.Transact(HubAccess::kRead, [&](HubTransaction& work) {
-    is_used = work.Query("SELECT FROM docent.maps UNION ALL SELECT FROM docent.tours").size() > 0;
+    const HubRows rows = work.Query(
+        "SELECT FROM docent.maps UNION ALL SELECT FROM docent.tours UNION ALL SELECT FROM docent.visits "
+        "LIMIT 1");
+    is_used = rows.size() > 0;
   });
   return is_used;
 }
@@ -83,7 +86,9 @@ std::vector<std::string> RestoreHub(const std::string& url, const std::filesyste
   // It makes the database and the roles, to which the backup refers.
   InitHub(url);
   if (IsInUse(url))
-    throw Error("the database has a hub with maps or tours; restore the backup into another database");
+    throw Error(
+        "the database has a hub with maps, tours or records of visits; restore the backup into another "
+        "database");
   HubConnection(url).ExecuteAlone("DROP SCHEMA docent CASCADE");
   const std::string problem =
       RunPostgresProgram({"pg_restore", "--single-transaction", "--exit-on-error", "--no-owner",

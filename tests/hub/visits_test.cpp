@@ -3,6 +3,7 @@
 
 #include "maps/hub/administration.h"
 #include "maps/hub/hub.h"
+#include "maps/hub/hub_backup.h"
 #include "maps/hub/hub_visits.h"
 #include "tests/hub/private_server.h"
 #include "tests/maps/map_samples.h"
@@ -48,6 +49,14 @@ TEST_F(HubVisits, AreHandedInOnceAndCollectedByCurators) {
         "SELECT docent.hand_in_visits('[{\"day\": \"2026-01-01\", \"line\": \"x\"}]')",
         "SELECT docent.hand_in_visits('[{\"day\": \"2026-01-01\", \"line\": \"{}\\n{}\"}]')"})
     EXPECT_NE(ErrorOfHubSql(visitor, sql), "") << sql;
+}
+
+TEST_F(HubVisits, ARestorationReplacesNoHubThatHasRecords) {
+  BackUpHub(Url(), folder_ / "empty.hub");
+  Write("device/visits-2026-11-24.jsonl", "{\"a\": 1}\n");
+  EXPECT_EQ(HandInVisits(Url(), folder_ / "device").added, 1u);
+  EXPECT_THAT(ErrorOf([&] { RestoreHub(Url(), folder_ / "empty.hub"); }), HasSubstr("another database"));
+  EXPECT_EQ(RunHubSql(Url(), "SELECT count(*) FROM docent.visits"), "1");
 }
 
 TEST_F(HubVisits, AHubOfVersionOneIsUpgraded) {
