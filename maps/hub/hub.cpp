@@ -89,6 +89,19 @@ Manifest ParseManifest(const HubRows& rows) {
   return manifest;
 }
 
+// The revisions of maps or tours in an entry about a restoration.
+std::map<std::string, std::int64_t> ParseRevisions(const FactsJson& restoration, const char* member) {
+  const auto list = restoration.find(member);
+  if (list == restoration.end() || !list->is_object()) RefuseRow("a restoration that is not valid");
+  std::map<std::string, std::int64_t> revisions;
+  for (const auto& [name, revision] : list->items()) {
+    const std::int64_t number = revision.is_number_integer() ? revision.get<std::int64_t>() : 0;
+    if (number < 1) RefuseRow("a restoration that is not valid");
+    revisions[name] = number;
+  }
+  return revisions;
+}
+
 FactsJson ToJson(const MapFacts& facts) {
   const MapInfo& info = facts.info;
   FactsJson json = {{"name", info.name},
@@ -125,7 +138,10 @@ std::string Dump(const FactsJson& json) {
 
 Hub::Hub(const std::string& url) : connection_(url) {
   connection_.Transact(HubAccess::kRead, [&](HubTransaction& work) {
-    const HubRows rows = work.Query("SELECT id, version FROM docent.hub");
+    // Only a restored hub has the column `restorations`.
+    const HubRows rows = work.Query(
+        "SELECT id, version, coalesce(to_jsonb(h) #>> '{restorations,-1,id}', ''), "
+        "pg_has_role('docent_curator', 'USAGE') FROM docent.hub h");
     if (rows.size() != 1) throw Error("this database holds no hub; docent hub init makes it one");
     id_ = CheckedMapId(rows.Text(0, 0));
     const std::int64_t version = rows.Integer(0, 1);
@@ -134,7 +150,28 @@ Hub::Hub(const std::string& url) : connection_(url) {
                   "; this program knows versions up to " + std::to_string(kHubVersion) + "); update Docent");
     if (version < kHubVersion)
       throw Error("the hub was made by an older Docent; an admin upgrades it with docent hub init");
+    restoration_ = rows.Text(0, 2);
+    if (!restoration_.empty() && !IsMapId(restoration_)) RefuseRow("a restoration that is not valid");
+    may_save_ = rows.Truth(0, 3);
   });
+}
+
+std::vector<HubRestoration> Hub::Restorations() {
+  std::vector<HubRestoration> restorations;
+  connection_.Transact(HubAccess::kRead, [&](HubTransaction& work) {
+    const HubRows rows =
+        work.Query("SELECT coalesce(to_jsonb(h) -> 'restorations', '[]'::jsonb) FROM docent.hub h");
+    const FactsJson list = FactsJson::parse(rows.Text(0, 0), nullptr, false);
+    if (!list.is_array()) RefuseRow("a restoration that is not valid");
+    for (const FactsJson& entry : list) {
+      const auto id = entry.find("id");
+      if (!entry.is_object() || id == entry.end() || !id->is_string() || !IsMapId(id->get<std::string>()))
+        RefuseRow("a restoration that is not valid");
+      restorations.push_back(
+          {id->get<std::string>(), ParseRevisions(entry, "maps"), ParseRevisions(entry, "tours")});
+    }
+  });
+  return restorations;
 }
 
 std::int64_t Hub::LastChange() {

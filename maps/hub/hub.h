@@ -3,6 +3,7 @@
 
 #include <chrono>
 #include <cstdint>
+#include <map>
 #include <optional>
 #include <span>
 #include <string>
@@ -28,6 +29,13 @@ struct HubTour {
   bool removed = false;
 };
 
+// A restoration of a hub from a backup. Revisions that were saved after the backup are lost, and their
+// numbers are used again, so that a number alone does not say which state of a map it means.
+struct HubRestoration {
+  std::string id;                                   // A UUID, new with each restoration.
+  std::map<std::string, std::int64_t> maps, tours;  // The newest revisions of the backup, by id and by name.
+};
+
 // Opens a hub, and asks it for maps and saves them.
 class Hub {
  public:
@@ -35,6 +43,11 @@ class Hub {
   explicit Hub(const std::string& url);
 
   const std::string& id() const { return id_; }  // Identifies the hub, wherever it moves.
+  // The last restoration of the hub (HubRestoration::id); empty if there was none.
+  const std::string& restoration() const { return restoration_; }
+  bool may_save() const { return may_save_; }  // Whether this user may save maps, as curators may.
+  // All restorations, the first one first.
+  std::vector<HubRestoration> Restorations();
   // The number of the last change. It grows with each.
   std::int64_t LastChange();
 
@@ -70,7 +83,8 @@ class Hub {
 
  private:
   HubConnection connection_;
-  std::string id_;
+  std::string id_, restoration_;
+  bool may_save_ = false;
 };
 
 }  // namespace docent::maps

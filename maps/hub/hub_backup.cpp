@@ -59,6 +59,20 @@ bool IsInUse(const std::string& url) {
   return is_used;
 }
 
+// Notes that the hub was restored and what it has, see HubRestoration. Only a restored hub has the column, so
+// that programs and hubs without it need no new version of the tables.
+void NoteRestoration(const std::string& url) {
+  HubConnection connection(url);
+  connection.Transact(HubAccess::kWrite, [](HubTransaction& work) {
+    work.Execute(
+        "ALTER TABLE docent.hub ADD COLUMN IF NOT EXISTS restorations jsonb NOT NULL DEFAULT '[]';"
+        "UPDATE docent.hub SET restorations = restorations || jsonb_build_array(jsonb_build_object("
+        "'id', gen_random_uuid(), "
+        "'maps', (SELECT coalesce(jsonb_object_agg(m.id, m.revision), '{}') FROM docent.maps m), "
+        "'tours', (SELECT coalesce(jsonb_object_agg(t.name, t.revision), '{}') FROM docent.tours t)))");
+  });
+}
+
 }  // namespace
 
 void BackUpHub(const std::string& url, const std::filesystem::path& file) {
@@ -95,6 +109,7 @@ std::vector<std::string> RestoreHub(const std::string& url, const std::filesyste
                           "--dbname=" + CheckedHubAddress(url), file.string()});
   if (!problem.empty())
     throw Error("the backup cannot be restored, and the database has no hub now: " + problem);
+  NoteRestoration(url);
   InitHub(url);  // Upgrades a backup of an older version.
   std::vector<std::string> unknown;
   HubConnection connection(url);

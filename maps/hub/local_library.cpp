@@ -133,9 +133,9 @@ std::string LocalLibrary::StampOf(std::uint64_t key) const {
   return ReadStamp(database_, key);
 }
 
-std::string LocalLibrary::SceneHashOf(std::uint64_t key) const {
+std::uint64_t LocalLibrary::NextKey() const {
   const Transaction transaction(database_, Transaction::Kind::kRead);
-  return HashOf(ReadScenePart(database_, key).text);
+  return ReadLibraryRow(database_).next_key;
 }
 
 LocalMap LocalLibrary::Read(std::uint64_t key, const Retarget& to_hub) const {
@@ -143,6 +143,7 @@ LocalMap LocalLibrary::Read(std::uint64_t key, const Retarget& to_hub) const {
   const std::optional<MapInfo> info = ReadMapRow(database_, key);
   if (!info) throw LocalChange(database_.file() + " has no map with the key " + std::to_string(key));
   LocalMap map;
+  map.state.stamp = ReadStamp(database_, key);
   WithMapContext(database_, *info, [&] {
     map.facts.info = *info;
     for (const std::string_view part : kHubParts)
@@ -152,6 +153,7 @@ LocalMap LocalLibrary::Read(std::uint64_t key, const Retarget& to_hub) const {
     if (const auto mesh = FindPart(database_, key, "mesh")) map.items["mesh"] = WithKey(*mesh, kHubKey);
     ReadHubImages(database_, key, &map.items);
     const ScenePart scene = ReadScenePart(database_, key);
+    map.state.scene_hash = HashOf(scene.text);
     const std::string text = Retargeted(scenes_, scene.text, to_hub);
     map.items["scene"] = Bytes(text.begin(), text.end());
     for (const std::string& id : scene.asset_ids) {
@@ -187,9 +189,12 @@ bool LocalLibrary::HasStructure(const LocalMap& map) const {
     }
     if (!stored || *stored != WithKey(bytes, key)) return false;
   }
+  // The facts are not covered by the bytes of the columns, and a map with wrong ones could not be loaded.
+  const MapInfo& wanted = map.facts.info;
   const std::optional<MapInfo> info = ReadMapRow(database_, key);
-  return info && info->keyframes == images && info->points == map.facts.info.points &&
-         info->observations == map.facts.info.observations;
+  return info && info->keyframes == images && wanted.keyframes == images && info->points == wanted.points &&
+         info->observations == wanted.observations && info->next_keyframe == wanted.next_keyframe &&
+         info->next_point == wanted.next_point;
 }
 
 void LocalLibrary::WriteItems(const LocalMap& map, const Retarget& to_local) {
@@ -219,7 +224,7 @@ void LocalLibrary::WriteItems(const LocalMap& map, const Retarget& to_local) {
   WriteScenePart(database_, key, scene);
 }
 
-void LocalLibrary::Write(const LocalMap& map, const Retarget& to_local, const std::string& stamp) {
+LocalState LocalLibrary::Write(const LocalMap& map, const Retarget& to_local, const std::string& stamp) {
   Transaction transaction(database_, Transaction::Kind::kWrite);
   const MapInfo& info = map.facts.info;
   CheckStamp(info.key, stamp);
@@ -238,7 +243,10 @@ void LocalLibrary::Write(const LocalMap& map, const Retarget& to_local, const st
     if (!problems.empty()) throw Error("the hub sent a damaged map, which was refused: " + problems.front());
     RemoveUnusedAssets(database_);
   });
+  // Of this transaction: after it, somebody else may change the map.
+  const LocalState state{ReadStamp(database_, info.key), HashOf(ReadScenePart(database_, info.key).text)};
   transaction.Commit();
+  return state;
 }
 
 void LocalLibrary::Remove(std::uint64_t key, const std::string& stamp) {

@@ -37,14 +37,15 @@ class LocalLibrary {
 
   // Changes whenever the map does: its entry, content, structure or mesh. Empty if there is no such map.
   std::string StampOf(std::uint64_t key) const;
-  // The whole map. Its signposts lead to what `to_hub` gives. Throws if it is damaged.
+  // The key that the next new map gets; no map has it or a higher one.
+  std::uint64_t NextKey() const;
+  // The whole map with its state. Its signposts lead to what `to_hub` gives. Throws if it is damaged.
   LocalMap Read(std::uint64_t key, const Retarget& to_hub) const;
-  // The hash of the text of the scene as it is stored.
-  std::string SceneHashOf(std::uint64_t key) const;
   // Adds or replaces a map with bytes that are not trusted: the whole map is decoded and checked before
   // anything becomes visible. `map.facts.info` has the key and the name here, and the signposts lead to what
-  // `to_local` gives. Throws LocalChange unless the stored map has this stamp, empty for none.
-  void Write(const LocalMap& map, const Retarget& to_local, const std::string& stamp);
+  // `to_local` gives. Returns the state of the written map. Throws LocalChange unless the stored map has this
+  // stamp, empty for none.
+  LocalState Write(const LocalMap& map, const Retarget& to_local, const std::string& stamp);
   // Removes a map whatever its policy, because the hub did so. Signposts to it stay, and lead nowhere.
   void Remove(std::uint64_t key, const std::string& stamp);
 

@@ -28,11 +28,18 @@ using Manifest = std::map<std::string, std::string>;
 // The bytes of items.
 using ItemBytes = std::map<std::string, Bytes>;
 
+// What tells a state of a map in a library from others.
+struct LocalState {
+  std::string stamp;       // LocalLibrary::StampOf.
+  std::string scene_hash;  // Of the text of the scene as it is stored.
+};
+
 // A map as it is in a library, with all its bytes.
 struct LocalMap {
   MapFacts facts;
   Manifest manifest;
   ItemBytes items;
+  LocalState state;  // With which all this was read or written.
 };
 
 // A revision of a map on a hub.

@@ -34,7 +34,7 @@ void WriteTheirs(SyncSession* session, const MapLink& link, const HubRevision& t
   map.facts.info.key = link.key;
   LocalMap local = map;
   local.facts.info.name = LocalName(session, theirs.facts.info.name, link.key);
-  session->local().Write(local, session->ToLocal(), stamp);
+  map.state = session->local().Write(local, session->ToLocal(), stamp);
   session->report().changed_keys.push_back(link.key);
   session->PutLink(AgreedLink(*session, link.id, theirs.revision, map, local.facts.info.name));
   session->state().ForgetReceived();
@@ -59,7 +59,7 @@ bool LinkEqualMap(SyncSession* session, const MapLink& link, const HubRevision& 
 
 // Merges what both sides have changed into the library; the next push saves it on the hub.
 void MergeHere(SyncSession* session, const MapInfo& info, const MapLink& link, const HubRevision& theirs,
-               const LocalMap& mine, const std::string& stamp) {
+               const LocalMap& mine) {
   const SessionLock lock = session->local().LockForReplacing();
   const std::string their_scene = SceneOf(session->Receive({{"scene", theirs.manifest.at("scene")}}, mine));
   Resolution resolution = Resolve(link, mine, theirs, their_scene, session->options().merge);
@@ -79,7 +79,7 @@ void MergeHere(SyncSession* session, const MapInfo& info, const MapLink& link, c
   map.items = session->Receive(map.manifest, sources);
   LocalMap local = map;
   local.facts.info.name = LocalName(session, map.facts.info.name, info.key);
-  session->local().Write(local, session->ToLocal(), stamp);
+  map.state = session->local().Write(local, session->ToLocal(), mine.state.stamp);
   session->report().changed_keys.push_back(info.key);
   // Both agree on what the hub has; what was changed here since is still to be pushed.
   MapLink agreed = AgreedLink(*session, link.id, theirs.revision, map, local.facts.info.name);
@@ -133,12 +133,11 @@ void PullMap(SyncSession* session, const HubHead& head) {
   const LocalMap mine = session->ReadLocal(info);
   if (IsSame(mine, *theirs)) {
     session->PutLink(AgreedLink(*session, link.id, theirs->revision, mine, info.name));
-  } else if (link.revision > 0 &&
-             (stamp == link.stamp || !IsChanged(link, mine, session->local().SceneHashOf(link.key)))) {
-    WriteTheirs(session, link, *theirs, mine, stamp);
+  } else if (link.revision > 0 && (mine.state.stamp == link.stamp || !IsChanged(link, mine))) {
+    WriteTheirs(session, link, *theirs, mine, mine.state.stamp);
     session->Say(QuotedName(head.name) + " was updated to revision " + std::to_string(head.revision));
   } else {
-    MergeHere(session, info, link, *theirs, mine, stamp);
+    MergeHere(session, info, link, *theirs, mine);
   }
 }
 

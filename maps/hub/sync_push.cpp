@@ -50,6 +50,8 @@ void AddToHub(SyncSession* session, const MapInfo& info, MapLink link, std::int6
     } catch (const Error&) {
       link.local_name = info.name;  // Its policy forbids another name here.
     }
+    // The new name has changed its entry, and its signposts to itself.
+    if (link.local_name == name) map = session->local().Read(info.key, session->ToHub());
   } else {
     link.local_name = info.name;
   }
@@ -76,12 +78,15 @@ void SaveChanges(SyncSession* session, const MapInfo& info, const MapLink& link,
 
 // Merges the map, which both sides have changed, and saves the result on both.
 void MergeAndSave(SyncSession* session, const MapInfo& info, const MapLink& link, const HubHead& head) {
-  // Before the hub saves what a session here would then undo.
-  const SessionLock lock = session->local().LockForReplacing();
   const LocalMap mine = session->ReadLocal(info);
-  const std::string stamp = session->local().StampOf(info.key);
   const std::optional<HubRevision> theirs = session->hub().Revision(link.id, head.revision);
   if (!theirs) throw HubConflict("the map was changed on the hub meanwhile");
+  if (IsSame(mine, *theirs)) {
+    session->PutLink(AgreedLink(*session, link.id, head.revision, mine, info.name));
+    return;
+  }
+  // Before the hub saves what a session here would then undo.
+  const SessionLock lock = session->local().LockForReplacing();
   const ItemBytes scene = session->Receive({{"scene", theirs->manifest.at("scene")}}, mine);
   Resolution resolution = Resolve(link, mine, *theirs, SceneOf(scene), session->options().merge);
   if (resolution.needs_two_maps) {
@@ -101,7 +106,7 @@ void MergeAndSave(SyncSession* session, const MapInfo& info, const MapLink& link
   LocalMap local = complete;
   local.facts.info.name =
       info.name == link.local_name && map.facts.info.name == link.name ? info.name : map.facts.info.name;
-  session->local().Write(local, session->ToLocal(), stamp);
+  complete.state = session->local().Write(local, session->ToLocal(), mine.state.stamp);
   session->report().changed_keys.push_back(info.key);
   session->PutLink(AgreedLink(*session, link.id, revision, complete, local.facts.info.name));
   session->Say(QuotedName(map.facts.info.name) + " was changed here and on the hub; the changes were merged" +
@@ -123,15 +128,11 @@ void PushMap(SyncSession* session, const MapInfo& info) {
     return;
   }
   const bool is_changed_there = head->revision != link.revision;
-  if (link.revision > 0) {
-    const std::string stamp = session->local().StampOf(info.key);
-    if (stamp == link.stamp ||
-        (!IsChanged(link, session->ReadLocal(info), session->local().SceneHashOf(info.key)) &&
-         is_changed_there)) {
-      if (is_changed_there)
-        session->Say(QuotedName(info.name) + " is newer on the hub; docent maps pull brings it");
-      return;
-    }
+  if (link.revision > 0 && (session->local().StampOf(info.key) == link.stamp ||
+                            (is_changed_there && !IsChanged(link, session->ReadLocal(info))))) {
+    if (is_changed_there)
+      session->Say(QuotedName(info.name) + " is newer on the hub; docent maps pull brings it");
+    return;
   }
   if (is_changed_there) {
     MergeAndSave(session, info, link, *head);

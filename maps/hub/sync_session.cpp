@@ -5,6 +5,7 @@
 #include <map>
 #include <thread>
 
+#include "maps/hub/restored_links.h"
 #include "maps/hub/sha256.h"
 #include "maps/library/map_names.h"
 
@@ -41,7 +42,46 @@ SyncSession::SyncSession(const SyncOptions& options, CreateIfMissing create)
       state_(options.library, hub_.id()),
       limit_(options.bytes_per_second),
       heads_(hub_.Heads()),
-      links_(state_.Links()) {}
+      links_(state_.Links()) {
+  CheckLinksAreOfThisLibrary();
+  if (!hub_.restoration().empty()) restorations_ = hub_.Restorations();
+  for (const std::uint64_t key : ForgetLostRevisions(restorations_, heads_, hub_.may_save(), &links_)) {
+    if (!local_.StampOf(key).empty())
+      Say(QuotedName(LinkOf(key)->local_name) +
+          " is newer here than on the hub, which was restored from a backup");
+  }
+}
+
+void SyncSession::CheckLinksAreOfThisLibrary() {
+  std::map<std::uint64_t, std::int64_t> created;
+  for (const MapInfo& info : local_.library().List())
+    created[info.key] = info.created.time_since_epoch().count();
+  const std::uint64_t next_key = local_.NextKey();
+  const bool is_other = std::any_of(links_.begin(), links_.end(), [&](const MapLink& link) {
+    const auto found = created.find(link.key);
+    return link.key >= next_key ||
+           (found != created.end() && link.created != 0 && link.created != found->second);
+  });
+  if (is_other) {
+    state_.RemoveAllLinks();
+    links_.clear();
+    Say(QuotedName(SyncStatePath(options_.library).string()) +
+        " was written for another library of this name, so that library and hub are compared anew");
+    return;
+  }
+  for (MapLink& link : links_) {
+    // Older programs did not store it.
+    const auto found = created.find(link.key);
+    if (link.revision == 0 || link.created != 0 || found == created.end()) continue;
+    link.created = found->second;
+    state_.Put(link);
+  }
+}
+
+void SyncSession::ReadHeads() {
+  heads_ = hub_.Heads();
+  ForgetLostRevisions(restorations_, heads_, hub_.may_save(), &links_);
+}
 
 const HubHead* SyncSession::HeadOf(const std::string& id) const {
   return FindIn(heads_, [&](const HubHead& head) { return head.id == id; });
@@ -164,19 +204,21 @@ MapLink AgreedLink(const SyncSession& session, const std::string& id, std::int64
   return {key,
           id,
           revision,
-          session.local().StampOf(key),
+          map.state.stamp,
           StructureDigest(map.facts, map.manifest),
-          session.local().SceneHashOf(key),
+          map.state.scene_hash,
           SceneOf(map.items),
           map.facts.info.name,
           local_name,
-          ToString(map.facts.info.policy)};
+          ToString(map.facts.info.policy),
+          map.facts.info.created.time_since_epoch().count(),
+          session.hub().restoration()};
 }
 
-bool IsChanged(const MapLink& link, const LocalMap& map, const std::string& scene_hash) {
+bool IsChanged(const MapLink& link, const LocalMap& map) {
   return link.structure != StructureDigest(map.facts, map.manifest) || link.name != map.facts.info.name ||
          link.policy != ToString(map.facts.info.policy) ||
-         (link.scene_hash != scene_hash && link.scene != SceneOf(map.items));
+         (link.scene_hash != map.state.scene_hash && link.scene != SceneOf(map.items));
 }
 
 void TakeEqualParts(const HubRevision& theirs, LocalMap* mine) {

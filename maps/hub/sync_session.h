@@ -35,6 +35,9 @@ class SyncSession {
   SyncSession(const SyncOptions& options, CreateIfMissing create);
 
   Hub& hub() { return hub_; }
+  const Hub& hub() const { return hub_; }
+  // Those of the hub, the first one first.
+  const std::vector<HubRestoration>& restorations() const { return restorations_; }
   LocalLibrary& local() { return local_; }
   const LocalLibrary& local() const { return local_; }
   SyncState& state() { return state_; }
@@ -42,7 +45,7 @@ class SyncSession {
   SyncReport& report() { return report_; }
 
   // Asks the hub for its list of maps again.
-  void ReadHeads() { heads_ = hub_.Heads(); }
+  void ReadHeads();
   const std::vector<HubHead>& heads() const { return heads_; }
   const HubHead* HeadOf(const std::string& id) const;       // Null if there is none.
   const HubHead* HeadNamed(const std::string& name) const;  // Of those that were not removed.
@@ -73,25 +76,30 @@ class SyncSession {
   std::set<std::string> NamesInUse() const;
 
  private:
+  // Removes the links if they were made for another library that had this name.
+  void CheckLinksAreOfThisLibrary();
+
   SyncOptions options_;
   Hub hub_;
   LocalLibrary local_;
   SyncState state_;
   RateLimit limit_;
   SyncReport report_;
+  std::vector<HubRestoration> restorations_;
   std::vector<HubHead> heads_;
-  std::vector<MapLink> links_;
+  std::vector<MapLink> links_;  // As stored, but for what the hub has lost (restored_links.h).
 };
 
 // The name as sentences have it.
 inline std::string QuotedName(const std::string& name) {
   return "'" + name + "'";
 }
-// The link of a map that is now equal on both sides. `map` has the name on the hub.
+// The link of a map that is now equal on both sides. `map` has the name on the hub, and its state is that of
+// what was sent or written, and not of what somebody else may have made of it since.
 MapLink AgreedLink(const SyncSession& session, const std::string& id, std::int64_t revision,
                    const LocalMap& map, const std::string& local_name);
-// Whether a map differs from what both sides last agreed on.
-bool IsChanged(const MapLink& link, const LocalMap& map, const std::string& scene_hash);
+// Whether a map, as it was read, differs from what both sides last agreed on.
+bool IsChanged(const MapLink& link, const LocalMap& map);
 // Takes from a revision of the hub what need not differ from it: what is computed from an equal structure,
 // and the names of files.
 void TakeEqualParts(const HubRevision& theirs, LocalMap* mine);

@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "maps/hub/sync_state.h"
 
+#include <algorithm>
 #include <array>
+#include <string_view>
 
 #include "engine/base/error.h"
 #include "maps/hub/map_facts.h"
@@ -25,6 +27,34 @@ constexpr std::array<const char*, 4> kStateTables = {
     "NOT NULL, policy TEXT NOT NULL) STRICT",
     "CREATE TABLE tours (name TEXT PRIMARY KEY, revision INTEGER NOT NULL, content TEXT NOT NULL) STRICT",
     "CREATE TABLE received (hash TEXT PRIMARY KEY, data BLOB NOT NULL) STRICT"};
+
+// Columns that the tables of older files lack. Older programs leave them as they are, or as by default.
+struct LaterColumn {
+  const char *table, *name, *type;
+};
+constexpr std::array<LaterColumn, 3> kLaterColumns = {{
+    {"links", "created", "INTEGER NOT NULL DEFAULT 0"},
+    {"links", "restoration", "TEXT NOT NULL DEFAULT ''"},
+    {"tours", "restoration", "TEXT NOT NULL DEFAULT ''"},
+}};
+
+bool HasColumn(const Database& database, const LaterColumn& column) {
+  Statement query = database.Prepare("SELECT 1 FROM pragma_table_info(?) WHERE name = ?");
+  return query.Bind(1, std::string_view(column.table)).Bind(2, std::string_view(column.name)).Step();
+}
+
+void AddLaterColumns(const Database& database) {
+  const auto is_there = [&](const LaterColumn& column) { return HasColumn(database, column); };
+  if (std::all_of(kLaterColumns.begin(), kLaterColumns.end(), is_there)) return;
+  Transaction transaction(database, Transaction::Kind::kWrite);
+  for (const LaterColumn& column : kLaterColumns) {
+    if (is_there(column)) continue;  // Another program may have added it meanwhile.
+    database.Execute(
+        (std::string("ALTER TABLE ") + column.table + " ADD COLUMN " + column.name + " " + column.type)
+            .c_str());
+  }
+  transaction.Commit();
+}
 
 void CreateState(const Database& database, const std::string& hub_id) {
   Transaction transaction(database, Transaction::Kind::kWrite);
@@ -50,6 +80,7 @@ void CheckState(const Database& database, const std::string& hub_id) {
 
 void CheckLink(const Database& database, const MapLink& link) {
   const bool valid = link.key != 0 && IsMapId(link.id) && link.revision >= 0 &&
+                     (link.restoration.empty() || IsMapId(link.restoration)) &&
                      (link.revision == 0 || (IsHash(link.structure) && IsHash(link.scene_hash) &&
                                              ValidateMapName(link.name).empty() && ParsePolicy(link.policy)));
   if (!valid)
@@ -69,18 +100,18 @@ SyncState::SyncState(const std::filesystem::path& library, const std::string& hu
   if (database_.Number("PRAGMA page_count") == 0) CreateState(database_, hub_id);
   CheckState(database_, hub_id);
   database_.StartWriting();
+  AddLaterColumns(database_);
 }
 
 std::vector<MapLink> SyncState::Links() const {
   Statement query = database_.Prepare(
-      "SELECT key, id, revision, stamp, structure, scene_hash, scene, name, local_name, policy FROM links "
-      "ORDER BY "
-      "key");
+      "SELECT key, id, revision, stamp, structure, scene_hash, scene, name, local_name, policy, created, "
+      "restoration FROM links ORDER BY key");
   std::vector<MapLink> links;
   while (query.Step()) {
     links.push_back({static_cast<std::uint64_t>(query.Integer(0)), query.Text(1), query.Integer(2),
                      query.Text(3), query.Text(4), query.Text(5), query.Text(6), query.Text(7), query.Text(8),
-                     query.Text(9)});
+                     query.Text(9), query.Integer(10), query.Text(11)});
     CheckLink(database_, links.back());
   }
   return links;
@@ -90,8 +121,7 @@ void SyncState::Put(const MapLink& link) {
   database_
       .Prepare(
           "INSERT OR REPLACE INTO links (key, id, revision, stamp, structure, scene_hash, scene, name, "
-          "local_name, "
-          "policy) VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?)")
+          "local_name, policy, created, restoration) VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)")
       .Bind(1, static_cast<std::int64_t>(link.key))
       .Bind(2, link.id)
       .Bind(3, link.revision)
@@ -102,6 +132,8 @@ void SyncState::Put(const MapLink& link) {
       .Bind(8, link.name)
       .Bind(9, link.local_name)
       .Bind(10, link.policy)
+      .Bind(11, link.created)
+      .Bind(12, link.restoration)
       .Run();
 }
 
@@ -110,18 +142,26 @@ void SyncState::RemoveLink(std::uint64_t key) {
 }
 
 std::vector<TourLink> SyncState::Tours() const {
-  Statement query = database_.Prepare("SELECT name, revision, content FROM tours ORDER BY name");
+  Statement query = database_.Prepare("SELECT name, revision, content, restoration FROM tours ORDER BY name");
   std::vector<TourLink> tours;
-  while (query.Step()) tours.push_back({query.Text(0), query.Integer(1), query.Text(2)});
+  while (query.Step()) tours.push_back({query.Text(0), query.Integer(1), query.Text(2), query.Text(3)});
   return tours;
 }
 
 void SyncState::Put(const TourLink& tour) {
-  database_.Prepare("INSERT OR REPLACE INTO tours (name, revision, content) VALUES (?, ?, ?)")
+  database_.Prepare("INSERT OR REPLACE INTO tours (name, revision, content, restoration) VALUES (?, ?, ?, ?)")
       .Bind(1, tour.name)
       .Bind(2, tour.revision)
       .Bind(3, tour.content)
+      .Bind(4, tour.restoration)
       .Run();
+}
+
+void SyncState::RemoveAllLinks() {
+  Transaction transaction(database_, Transaction::Kind::kWrite);
+  database_.Execute("DELETE FROM links");
+  database_.Execute("DELETE FROM tours");
+  transaction.Commit();
 }
 
 void SyncState::RemoveTour(const std::string& name) {

@@ -12,7 +12,9 @@
 
 // What a device knows of its hub: the file NAME.docent.hub beside the library, an SQLite database. It is
 // written after the library, so that a crash between the two leaves an older state here; then the next
-// synchronization finds that library and hub agree already. Not thread-safe. Errors throw docent::Error.
+// synchronization finds that library and hub agree already. Links say which map they were made for, because
+// another library may later have this name, and under which restoration of the hub, because the numbers of
+// revisions mean other states after one. Not thread-safe. Errors throw docent::Error.
 namespace docent::maps {
 
 // A map of the library on the hub, and what it was when both last agreed.
@@ -27,6 +29,8 @@ struct MapLink {
   std::string name;           // On the hub.
   std::string local_name;     // In the library, where another map may have had the name.
   std::string policy;         // As in policy.h.
+  std::int64_t created = 0;   // MapInfo::created of the map with this key, in ns; 0 if that is not known.
+  std::string restoration;    // Hub::restoration at that time.
 };
 
 // A tour of the library on the hub, and what it was when both last agreed.
@@ -34,6 +38,7 @@ struct TourLink {
   std::string name;           // On both.
   std::int64_t revision = 0;  // On the hub.
   std::string content;        // Language, minutes and stops as one text; empty if it was removed.
+  std::string restoration;    // As MapLink::restoration.
 };
 
 // The open file.
@@ -50,6 +55,8 @@ class SyncState {
   std::vector<TourLink> Tours() const;  // By name.
   void Put(const TourLink& tour);
   void RemoveTour(const std::string& name);
+  // Removes all links of maps and tours.
+  void RemoveAllLinks();
 
   // Bytes that were received for a map that is not complete yet, so that an interrupted transfer goes on.
   std::optional<Bytes> Received(const std::string& hash) const;

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
 
+#include "maps/hub/restored_links.h"
 #include "maps/hub/sync_session.h"
 #include "maps/library/map_names.h"
 
@@ -41,6 +42,13 @@ auto TourNamed(const Items& items, const std::string& name) {
   const auto found =
       std::find_if(items.begin(), items.end(), [&](const auto& item) { return item.name == name; });
   return found == items.end() ? nullptr : &*found;
+}
+
+// What was agreed on about tours, without what the hub has lost.
+std::vector<TourLink> TourLinks(SyncSession* session, const std::vector<HubTour>& theirs) {
+  std::vector<TourLink> links = session->state().Tours();
+  ForgetLostRevisions(session->restorations(), theirs, session->hub().may_save(), &links);
+  return links;
 }
 
 std::vector<Tour> LocalTours(SyncSession* session) {
@@ -93,11 +101,11 @@ void PushTour(SyncSession* session, const Tour& tour, const std::vector<HubTour>
       base = 0;
     }
   } else if (on_hub != nullptr && !on_hub->removed) {
-    session->state().Put(TourLink{tour.name, base, content});
+    session->state().Put(TourLink{tour.name, base, content, session->hub().restoration()});
     return;
   }
   session->hub().SaveTour(*mine, base);
-  session->state().Put(TourLink{mine->name, base + 1, content});
+  session->state().Put(TourLink{mine->name, base + 1, content, session->hub().restoration()});
   session->Say("The tour '" + mine->name + "' was saved on the hub");
 }
 
@@ -130,14 +138,15 @@ void PullTour(SyncSession* session, const HubTour& theirs, const std::vector<Tou
     session->Say("The tour '" + theirs.name + "' was updated");
   }
   const std::optional<HubTour> written = ForHub(*session, wanted);
-  session->state().Put(TourLink{theirs.name, theirs.revision, written ? ContentOf(*written) : ""});
+  session->state().Put(TourLink{theirs.name, theirs.revision, written ? ContentOf(*written) : "",
+                                session->hub().restoration()});
 }
 
 }  // namespace
 
 void PushTours(SyncSession* session) {
   const std::vector<HubTour> theirs = session->hub().Tours();
-  const std::vector<TourLink> links = session->state().Tours();
+  const std::vector<TourLink> links = TourLinks(session, theirs);
   const std::vector<Tour> tours = LocalTours(session);
   for (const Tour& tour : tours) {
     try {
@@ -163,7 +172,7 @@ void PushTours(SyncSession* session) {
 
 void PullTours(SyncSession* session) {
   const std::vector<HubTour> theirs = session->hub().Tours();
-  const std::vector<TourLink> links = session->state().Tours();
+  const std::vector<TourLink> links = TourLinks(session, theirs);
   for (const HubTour& tour : theirs) {
     try {
       PullTour(session, tour, LocalTours(session), theirs, TourNamed(links, tour.name));

@@ -33,7 +33,7 @@ class HubRoles : public WithHubServer {
   std::string ErrorOfSave(const std::string& user, const std::function<void(LocalMap*)>& change) {
     Hub hub(Url(user));
     const HubRevision revision = *hub.Revision(head_.id, head_.revision);
-    LocalMap map{revision.facts, revision.manifest, {}};
+    LocalMap map{revision.facts, revision.manifest, {}, {}};
     change(&map);
     return ErrorOf([&] {
       for (const auto& [item, bytes] : map.items) {

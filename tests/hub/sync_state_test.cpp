@@ -4,6 +4,7 @@
 #include <gmock/gmock.h>
 
 #include <fstream>
+#include <functional>
 
 #include "engine/base/error.h"
 #include "maps/hub/local_library.h"
@@ -63,7 +64,10 @@ TEST_F(HubState, ADamagedOrHostileFileCostsNoMap) {
       "UPDATE links SET scene = ''",
       "UPDATE links SET name = char(10) || name",
       "UPDATE links SET policy = 'none'",
-      "INSERT INTO tours VALUES ('T', 5, 'x')",
+      "INSERT INTO tours (name, revision, content) VALUES ('T', 5, 'x')",
+      "UPDATE links SET created = created + 1 WHERE name = 'Desk'",
+      "UPDATE links SET restoration = 'x'",
+      "UPDATE links SET restoration = id",
       "INSERT OR IGNORE INTO received SELECT scene_hash, x'00' FROM links",
       "DROP TABLE received; CREATE VIEW received AS SELECT 'x' AS hash, x'00' AS data",
       "CREATE TRIGGER t AFTER INSERT ON received BEGIN DELETE FROM links; END"};
@@ -103,6 +107,83 @@ TEST_F(HubState, AColumnWithAnotherKeyThanThoseOfAHubIsRefused) {
   EXPECT_EQ(device.StampOf(map.facts.info.key), "");
   device.Write(map, {}, "");
   EXPECT_EQ(device.Read(map.facts.info.key, {}).manifest, map.manifest);
+}
+
+TEST_F(HubState, FactsThatDoNotFitAKnownStructureAreRefused) {
+  std::uint64_t key = 0;
+  {
+    Library a = OpenSampleLibrary(folder_ / "a");
+    key = AddSampleMap(&a, "Desk", 7);
+  }
+  LocalMap map = LocalLibrary(folder_ / "a", CreateIfMissing::kNo, {}).Read(key, {});
+  LocalLibrary device(folder_ / "b", CreateIfMissing::kYes, {});
+  key = map.facts.info.key = device.library().NewKey();
+  const LocalState written = device.Write(map, {}, "");
+  EXPECT_EQ(written.stamp, device.StampOf(key));
+  EXPECT_EQ(device.Read(key, {}).state.stamp, written.stamp);
+  EXPECT_EQ(device.Read(key, {}).state.scene_hash, written.scene_hash);
+  const std::vector<std::function<void(MapInfo*)>> attacks = {
+      [](MapInfo* info) { ++info->keyframes; }, [](MapInfo* info) { ++info->points; },
+      [](MapInfo* info) { ++info->observations; }, [](MapInfo* info) { info->next_keyframe = 0; },
+      [](MapInfo* info) { info->next_point = 0; }};
+  for (std::size_t i = 0; i < attacks.size(); ++i) {
+    SCOPED_TRACE(i);
+    LocalMap other = map;
+    attacks[i](&other.facts.info);
+    EXPECT_THROW(device.Write(other, {}, written.stamp), Error);
+    EXPECT_EQ(device.StampOf(key), written.stamp);
+    EXPECT_EQ(ErrorOf([&] { device.library().Load(key); }), "");
+  }
+}
+
+TEST_F(HubState, AFileBesideANewLibraryIsNotUsed) {
+  {
+    Library a = OpenSampleLibrary(folder_ / "a");
+    AddSampleMap(&a, "Desk", 7);
+    AddSampleMap(&a, "Hall", 8);
+  }
+  Push(SampleSync(Url(), folder_ / "a"));
+  // Each new library has given out fewer keys than the old one, or the same keys to other maps.
+  for (const std::uint64_t maps : {0u, 1u, 2u}) {
+    SCOPED_TRACE(maps);
+    const std::string name = "new" + std::to_string(maps);
+    std::filesystem::copy_file(SyncStatePath(folder_ / "a"), SyncStatePath(folder_ / name));
+    {
+      Library library = OpenSampleLibrary(folder_ / name);
+      for (std::uint64_t i = 0; i < maps; ++i)
+        AddSampleMap(&library, name + " " + std::to_string(i), 10 * maps + i);
+    }
+    SyncOptions options = SampleSync(Url(), folder_ / name);
+    options.remove = true;
+    const SyncReport report = Push(options);
+    EXPECT_THAT(LinesOf(report), HasSubstr("was written for another library"));
+    EXPECT_EQ(report.problems, 0);
+    EXPECT_THAT(Push(options).lines, IsEmpty()) << "it is told once";
+  }
+  Pull(SampleSync(Url(), folder_ / "new2"));
+  EXPECT_EQ(NamesIn(OpenSampleLibrary(folder_ / "new2")), "Desk,Hall,new1 0,new2 0,new2 1");
+  EXPECT_EQ(DifferenceOf("Desk", folder_ / "a", folder_ / "new2"), "");
+  EXPECT_EQ(Pull(SampleSync(Url(), folder_ / "a")).problems, 0);
+  EXPECT_EQ(NamesIn(OpenSampleLibrary(folder_ / "a")), "Desk,Hall,new1 0,new2 0,new2 1");
+}
+
+TEST_F(HubState, AFileOfAnOlderProgramIsUsed) {
+  {
+    Library a = OpenSampleLibrary(folder_ / "a");
+    AddSampleMap(&a, "Desk", 7);
+  }
+  Push(SampleSync(Url(), folder_ / "a"));
+  const std::filesystem::path state = SyncStatePath(folder_ / "a");
+  {
+    const maps::Database database = maps::Database::OpenReadWrite(state, false);
+    for (const char* sql :
+         {"ALTER TABLE links DROP COLUMN created", "ALTER TABLE links DROP COLUMN restoration",
+          "ALTER TABLE tours DROP COLUMN restoration"})
+      database.Execute(sql);
+  }
+  EXPECT_THAT(Push(SampleSync(Url(), folder_ / "a")).lines, IsEmpty());
+  EXPECT_NE(maps::Database::OpenReadWrite(state, false).Number("SELECT created FROM links"), 0)
+      << "it knows its library from now on";
 }
 
 }  // namespace

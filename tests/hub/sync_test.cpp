@@ -258,6 +258,26 @@ TEST_F(HubSync, AnInterruptedPullGoesOnWhereItWas) {
   EXPECT_EQ(DifferenceOf("Desk", folder_ / "a", folder_ / "b"), "");
 }
 
+TEST_F(HubSync, WhatIsSavedDuringAPushIsPushedNext) {
+  {
+    Library a = Open("a");
+    AddSampleMap(&a, "Desk", 1);
+  }
+  SyncOptions options = SampleSync(Url(), folder_ / "a");
+  int asked = 0;
+  options.is_stopped = [&] {
+    // The map was read, and is being sent.
+    if (++asked == 2) AddSampleSignpost(folder_ / "a", "Desk", "sign-2", "Late");
+    return false;
+  };
+  EXPECT_EQ(Push(options).problems, 0);
+  ASSERT_GT(asked, 2);
+  EXPECT_THAT(LinesOf(PushFrom("a")), HasSubstr("was saved on the hub as revision 2"));
+  PullTo("b");
+  EXPECT_EQ(TextsIn(Open("b"), Open("b").FindByName("Desk").key), "sign-1=Hello sign-2=Late");
+  EXPECT_THAT(PushFrom("a").lines, testing::IsEmpty());
+}
+
 TEST_F(HubSync, TheRateIsKept) {
   {
     Library a = Open("a");
