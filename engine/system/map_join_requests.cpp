@@ -50,17 +50,17 @@ MapJoinRequests::Answer MapJoinRequests::Check(const MappingThread::MapperUpdate
 }
 
 void MapJoinRequests::Handle(const MapJoinAttempt& attempt, KnownMap* into) {
-  KnownMap& from = state_.maps.at(pending_->from);
-  pending_.reset();
+  const Pending request = *std::exchange(pending_, std::nullopt);
+  KnownMap& from = state_.maps.at(request.from);
   if (!attempt.joined) {
     if (attempt.overlap.outcome == MapOverlap::Outcome::kInterrupted) return;
-    from.join_at = CompareAgainAt(KeyFramesOf(*into->snapshot, *from.snapshot), attempt_growth_);
+    from.join_at = CompareAgainAt(KeyFramesOf(*into->snapshot, *request.snapshot), attempt_growth_);
     JoinRefused event{from.key, attempt.refusal, attempt.overlap, std::exchange(from.join_asked, false)};
     event.overlap.candidates.clear();
     state_.Emit(state_.LastTime(), into->key, std::move(event));
     return;
   }
-  from.joined_into = into->key;
+  from.JoinInto(into->key);
   index_.RemoveMap(from.key);
   for (auto& [key, map] : state_.maps) {
     if (map.Exists() && key != into->key && map.join_with == from.key) map.join_with = into->key;

@@ -78,7 +78,7 @@ void MapPolicy::LeavePreviousMap(std::uint64_t previous, std::uint64_t entered, 
     left.join_with = entered;
     return;
   }
-  left.discarded = true;
+  left.Discard();
   index_.RemoveMap(previous);
   MapDiscarded event;
   event.reason = MapDiscarded::Reason::kRelocalizedElsewhere;
@@ -126,7 +126,7 @@ void MapPolicy::Discard(std::size_t index, Timestamp time, MapDiscarded event) {
   KnownMap& map = state_.maps.at(key);
   const std::uint64_t next_key = NewKey();
   if (next_key == 0) return;
-  map.discarded = true;
+  map.Discard();
   index_.RemoveMap(key);
   KnownMap& next = state_.AddMap(next_key);
   next.started_here = true;

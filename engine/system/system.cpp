@@ -235,8 +235,8 @@ void System::AddMap(std::uint64_t key, std::shared_ptr<const MapSnapshot> snapsh
 
 void System::SetSnapshot(std::uint64_t key, std::shared_ptr<const MapSnapshot> snapshot) {
   const std::scoped_lock lock(mutex_);
-  if (const auto found = state_.maps.find(key); found != state_.maps.end() && key != state_.active_key)
-    found->second.SetSnapshot(std::move(snapshot));
+  KnownMap* const map = state_.FindMap(key);
+  if (map != nullptr && map->Exists() && key != state_.active_key) map->SetSnapshot(std::move(snapshot));
 }
 
 bool System::ReplaceSnapshot(std::uint64_t key, const std::shared_ptr<const MapSnapshot>& expected,
@@ -282,7 +282,7 @@ void System::RemoveMap(std::uint64_t key) {
   policy_.LeaveMap(key);
   index_.RemoveMap(key);
   // Late updates of the mapper are ignored.
-  if (KnownMap* const map = state_.FindMap(key)) map->discarded = true;
+  if (KnownMap* const map = state_.FindMap(key)) map->Discard();
 }
 
 void System::Activate(std::uint64_t key) {

@@ -50,6 +50,15 @@ struct KnownMap {
     had_snapshot |= newer != nullptr;
     snapshot = std::move(newer);
   }
+  // The map ends. Nothing reads the snapshot of a map that does not exist.
+  void Discard() {
+    discarded = true;
+    snapshot.reset();
+  }
+  void JoinInto(std::uint64_t other) {
+    joined_into = other;
+    snapshot.reset();
+  }
   // It was started here, and the mapper has not made anything of it.
   bool WasNeverInitialized() const { return started_here && !had_snapshot; }
   // False once the map was discarded or joined into another one.

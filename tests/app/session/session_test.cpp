@@ -135,6 +135,12 @@ TEST(Session, StartsAgainWithTheNextImageWhenTheFirstIsLost) {
     if (event.detail.find("discarded") != std::string::npos) discarded.push_back(event.detail);
   ASSERT_EQ(discarded.size(), 1u);
   EXPECT_THAT(discarded[0], HasSubstr("before the map had finite points"));
+  const auto maps = session.Maps();
+  const auto ended =
+      std::find_if(maps.begin(), maps.end(), [](const Session::MapState& map) { return map.discarded; });
+  ASSERT_NE(ended, maps.end());
+  ASSERT_FALSE(ended->snapshot->keyframes.empty()) << "a report counts them";
+  EXPECT_TRUE(ended->snapshot->keyframes[0].features->levels[0].empty()) << "its images are kept in memory";
 }
 
 // One author's session in lockstep and the library that it saved; the tests do not change them.

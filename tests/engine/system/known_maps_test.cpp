@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <memory>
+#include <utility>
 #include <variant>
 
 #include "engine/system/system.h"
@@ -39,6 +40,18 @@ TEST_F(KnownMaps, AreRemovedFromThePlaceIndexAlthoughTheyAreNotInMemory) {
     const auto* const left = std::get_if<MapLeft>(&event.what);
     EXPECT_TRUE(left == nullptr || !left->forgotten) << "it was initialized in an earlier session";
   }
+}
+
+TEST_F(KnownMaps, AreFreedWhenTheyAreRemoved) {
+  auto map = MapOfOneView();
+  const std::weak_ptr<const MapSnapshot> watched = map;
+  system_.AddMap(1, std::move(map), MapPermissions());
+  system_.RemoveMap(1);
+  EXPECT_TRUE(watched.expired());
+  auto late = MapOfOneView();
+  const std::weak_ptr<const MapSnapshot> loaded_late = late;
+  system_.SetSnapshot(1, std::move(late));
+  EXPECT_TRUE(loaded_late.expired());
 }
 
 }  // namespace

@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <memory>
+#include <variant>
 
 #include "tests/engine/mapping/panorama/panorama_scene.h"
 
@@ -28,7 +29,11 @@ std::shared_ptr<const MapSnapshot> MapWithoutDepth() {
 // Two cameras of one wearer, without images: the tests say what the trackers find.
 class PolicyForTwoCameras : public ::testing::Test {
  protected:
-  PolicyForTwoCameras() { state_.cameras.resize(2); }
+  PolicyForTwoCameras() {
+    state_.cameras.resize(2);
+    for (SystemCamera& camera : state_.cameras)
+      camera.calibration_monitor = std::make_unique<CalibrationMonitor>(testing_world::Camera());
+  }
 
   MapAssignment& Assignment(std::size_t camera) { return state_.cameras[camera].assignment; }
   KnownMap& MapOf(std::uint64_t key) { return state_.maps.at(key); }
@@ -37,13 +42,14 @@ class PolicyForTwoCameras : public ::testing::Test {
     const KnownMap* const map = state_.FindMap(Assignment(camera).map());
     return Assignment(camera).TakeOrder(map != nullptr && map->snapshot && map->snapshot->HasFinitePoints());
   }
-  // A frame of the camera ends in this state.
-  TrackedFrame Handle(std::size_t camera, double seconds, TrackingState state, bool left_map = false) {
+  // A frame of the camera ends in this state, and in this map if it has a pose.
+  TrackedFrame Handle(std::size_t camera, double seconds, TrackingState state, std::uint64_t map = 0,
+                      bool left_map = false) {
     TrackedFrame frame;
     frame.frame.time = FromSeconds(seconds);
     frame.state = state;
+    frame.map_key = map;
     frame.left_map = left_map;
-    frame.map_key = HasPose(state) ? 1 : 0;
     policy_.HandleResult(camera, &frame);
     return frame;
   }
@@ -128,7 +134,7 @@ TEST_F(PolicyForTwoCameras, KeepsAMapThatWasOrderedWhileTheCameraLeftTheLastOne)
   options_.new_map_when_lost = true;
   LoseMapWithAPoint(2);
   policy_.StartMap(5, 0, false);
-  Handle(0, 2.1, TrackingState::kLost, /*left_map=*/true);
+  Handle(0, 2.1, TrackingState::kLost, /*map=*/0, /*left_map=*/true);
   EXPECT_EQ(state_.active_key, 5u);
   EXPECT_EQ(NextOrder(0), Order::kStart);
 }
@@ -136,7 +142,7 @@ TEST_F(PolicyForTwoCameras, KeepsAMapThatWasOrderedWhileTheCameraLeftTheLastOne)
 TEST_F(PolicyForTwoCameras, DoesNotCountARejectedPoseAsALossInTheMapThatWasOrdered) {
   LoseMapWithAPoint(2);
   policy_.StartMap(5, 0, false);
-  EXPECT_EQ(Handle(1, 2.1, TrackingState::kSixDof).state, TrackingState::kLost);
+  EXPECT_EQ(Handle(1, 2.1, TrackingState::kSixDof, 1).state, TrackingState::kLost);
   EXPECT_FALSE(Assignment(1).lost_since());
 }
 
@@ -173,6 +179,46 @@ TEST_F(PolicyForTwoCameras, TracksAMapThatTheMapperHasMadeOfTheInitialViews) {
   MapOf(1).SetSnapshot(MapWithAPoint());
   policy_.Activate(MapOf(1));
   EXPECT_EQ(NextOrder(0), Order::kNone);
+}
+
+TEST_F(PolicyForTwoCameras, KeepsNoSnapshotOfADiscardedMap) {
+  options_.new_map_when_lost = true;
+  LoseMapWithAPoint(2);
+  Lose(0, 2.25);
+  for (const std::size_t camera : {0, 1}) NextOrder(camera);
+  MapOf(2).SetSnapshot(MapWithoutDepth());
+  Handle(0, 2.3, TrackingState::kPanorama, 2);
+  Lose(0, 2.4);
+  Lose(0, 2.6);
+  ASSERT_TRUE(MapOf(2).discarded) << "the camera was lost before it had depth";
+  EXPECT_FALSE(MapOf(2).snapshot);
+  for (const std::size_t camera : {0, 1}) NextOrder(camera);
+  MapOf(3).SetSnapshot(MapWithoutDepth());
+  Handle(0, 2.7, TrackingState::kPanorama, 3);
+  Handle(0, 2.8, TrackingState::kRelocalized, 1);
+  ASSERT_TRUE(MapOf(3).discarded) << "the camera is back in the first map";
+  EXPECT_FALSE(MapOf(3).snapshot);
+  EXPECT_TRUE(MapOf(1).snapshot);
+}
+
+TEST_F(PolicyForTwoCameras, KeepsNoSnapshotOfAMapThatWasJoinedIntoAnother) {
+  LoseMapWithAPoint(2);
+  state_.AddMap(2).SetSnapshot(MapWithAPoint());
+  policy_.joins().Ask(&MapOf(2), MapOf(1));
+  MapJoinAttempt attempt;
+  attempt.joined = std::make_shared<const JoinedMap>();
+  policy_.joins().Handle(attempt, &MapOf(1));
+  EXPECT_EQ(MapOf(2).joined_into, 1u);
+  EXPECT_FALSE(MapOf(2).snapshot);
+}
+
+TEST_F(PolicyForTwoCameras, AnswersARequestToJoinAMapThatWasRemovedMeanwhile) {
+  LoseMapWithAPoint(2);
+  state_.AddMap(2).SetSnapshot(MapWithAPoint());
+  policy_.joins().Ask(&MapOf(2), MapOf(1));
+  MapOf(2).Discard();
+  policy_.joins().Handle(MapJoinAttempt(), &MapOf(1));
+  EXPECT_TRUE(std::holds_alternative<JoinRefused>(state_.events.back().what));
 }
 
 TEST_F(PolicyForTwoCameras, StartsAMapWithOneCameraAlthoughItIsActivatedAtOnce) {
