@@ -117,9 +117,11 @@ void System::OfferToMapper(std::size_t index, const TrackedFrame& frame) {
   std::uint64_t key = 0;
   {
     const std::scoped_lock lock(mutex_);
-    key = state_.cameras[index].assignment.map();
+    const MapAssignment& assignment = state_.cameras[index].assignment;
+    key = assignment.map();
     const auto found = state_.maps.find(key);
-    if (found == state_.maps.end() || key != state_.active_key) {
+    // A map that was ordered during the frame is another one than the frame was tracked in.
+    if (found == state_.maps.end() || key != state_.active_key || assignment.has_order()) {
       if (pair) tracker.StartFailed();
       return;
     }
