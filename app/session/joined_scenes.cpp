@@ -1,7 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "app/session/joined_scenes.h"
 
+#include <algorithm>
+#include <map>
 #include <memory>
+#include <string>
 #include <utility>
 
 #include "app/session/content_follower.h"
@@ -16,6 +19,27 @@ bool LeadsToMap(const content::Entity& entity, const maps::MapInfo& map) {
          maps::LeadsTo({entity.signpost.to_key, entity.signpost.to_map}, map);
 }
 
+bool HasGroup(const content::Scene& scene, const std::string& group) {
+  return std::ranges::any_of(scene.entities,
+                             [&](const content::Entity& entity) { return entity.group == group; });
+}
+
+// New names for the groups of B that A has too, by their old ones. What was not grouped together stays apart.
+std::map<std::string, std::string> FreeGroups(const content::Scene& a, const content::Scene& b) {
+  std::map<std::string, std::string> groups;
+  for (const content::Entity& entity : b.entities) {
+    const std::string& group = entity.group;
+    if (group.empty() || groups.contains(group) || !HasGroup(a, group)) continue;
+    std::string name;
+    int number = 2;
+    do {
+      name = group + "-" + std::to_string(number++);
+    } while (HasGroup(a, name) || HasGroup(b, name));
+    groups[group] = name;
+  }
+  return groups;
+}
+
 }  // namespace
 
 void MergeScene(const content::Scene& b, const maps::MapInfo& map_a, const maps::MapInfo& map_b,
@@ -23,8 +47,10 @@ void MergeScene(const content::Scene& b, const maps::MapInfo& map_a, const maps:
   content::Scene aligned = b;
   for (content::Entity& entity : aligned.entities) content::MoveWithAnchor(joined.a_from_b, &entity);
   const auto moved = Moved(aligned, ContentFollower().Follow(aligned, *joined.aligned, *joined.map));
+  const std::map<std::string, std::string> groups = FreeGroups(*scene, b);
   for (content::Entity entity : moved->entities) {
     entity.name = scene->FreeName(entity.name);
+    if (const auto group = groups.find(entity.group); group != groups.end()) entity.group = group->second;
     scene->entities.push_back(std::move(entity));
   }
   const content::MapSettings settings = content::Transformed(joined.a_from_b, b.settings);

@@ -12,8 +12,8 @@
 namespace docent::app {
 
 // Adds the entities of map B to `scene`, the scene of map A in the joined map; each entity stays with its
-// anchor. Duplicate names get a number. A signpost that led from one of the two maps to the other leads
-// nowhere.
+// anchor. Duplicate names, also of groups, get a number. A signpost that led from one of the two maps to the
+// other leads nowhere.
 void MergeScene(const content::Scene& b, const maps::MapInfo& map_a, const maps::MapInfo& map_b,
                 const engine::JoinedMap& joined, content::Scene* scene);
 

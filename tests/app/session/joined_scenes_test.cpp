@@ -69,6 +69,23 @@ TEST(JoinedScenes, HoldTheContentOfBothMapsInTheCoordinatesOfTheFirst) {
   EXPECT_NEAR(fox.scale, 0.75, 1e-9);
 }
 
+TEST(JoinedScenes, KeepGroupsOfTheSameNameApart) {
+  content::Scene a, b;
+  a.entities = {Sign("sign-1", "", {0.5, 0.2, 3}), Sign("sign-2", "", {0, 0, 3})};
+  for (content::Entity& entity : a.entities) entity.group = "group-1";
+  b.entities = {Sign("sign-3", "", {1, 2, 3}), Sign("sign-4", "", {1, 1, 3}), Sign("sign-5", "", {0, 1, 3}),
+                Sign("sign-6", "", {0, 1, 2})};
+  b.entities[0].group = b.entities[1].group = "group-1";
+  b.entities[2].group = "group-1-2";
+  const content::Scene both = JoinScenes(a, b, Map(1, "East"), Map(2, "West"), Joined({}));
+  EXPECT_EQ(both.Find("sign-1")->group, "group-1");
+  EXPECT_EQ(both.Find("sign-2")->group, "group-1");
+  EXPECT_EQ(both.Find("sign-3")->group, "group-1-3");
+  EXPECT_EQ(both.Find("sign-4")->group, "group-1-3");
+  EXPECT_EQ(both.Find("sign-5")->group, "group-1-2");
+  EXPECT_EQ(both.Find("sign-6")->group, "");
+}
+
 TEST(JoinedScenes, HaveNoSignpostToTheirOwnMap) {
   content::Scene a, b;
   a.entities = {Sign("sign-1", "West", {0.5, 0.2, 3})};
