@@ -210,17 +210,24 @@ TimedCommand BeforeFrame(std::size_t frame, Command command) {
 }
 
 // The camera walks on from the first map into the second and back over the whole way.
-TEST(LiveJoining, JoinsTwoMapsWhenAPersonAsksForIt) {
+struct WayBack {
+  WayBack() {
+    Append(0, 120, &order);
+    second = order.size();
+    Append(120, 30, &order);
+    asked = order.size();
+    Append(30, 90, &order);
+  }
   std::vector<int> order;
-  Append(0, 120, &order);
-  const std::size_t second = order.size();
-  Append(120, 30, &order);
-  const std::size_t asked = order.size();
-  Append(30, 90, &order);
+  std::size_t second = 0, asked = 0;  // When the second map begins, and when joining is asked for.
+};
+
+TEST(LiveJoining, JoinsTwoMapsWhenAPersonAsksForIt) {
+  const WayBack way;
   const SourceRun outcome =
-      RunInOrder(Simulate("loop"), order, Pace::kLockstep, nullptr,
+      RunInOrder(Simulate("loop"), way.order, Pace::kLockstep, nullptr,
                  {BeforeFrame(kSignInFirst, PlaceSignpost{"first", kMiddle, ""}),
-                  BeforeFrame(second, NewMap{"Annex"}), BeforeFrame(asked, JoinMap{"Hall"})});
+                  BeforeFrame(way.second, NewMap{"Annex"}), BeforeFrame(way.asked, JoinMap{"Hall"})});
   EXPECT_THAT(outcome.map_events, ::testing::Contains(HasSubstr("maps Annex and Hall were joined")));
   ASSERT_EQ(outcome.maps.size(), 1u) << ::testing::PrintToString(outcome.map_events);
   EXPECT_EQ(outcome.maps[0].name, "Annex");
@@ -228,19 +235,15 @@ TEST(LiveJoining, JoinsTwoMapsWhenAPersonAsksForIt) {
   EXPECT_EQ(outcome.maps[0].scene->entities.size(), 1u);
 }
 
-// The same walk, with a signpost in the second map that led to the first one at first.
+// The same way, with a signpost in the second map that led to the first one at first.
 TEST(LiveJoining, UndoRestoresNoSignpostThatLeadsToAMapThatWasJoined) {
-  std::vector<int> order;
-  Append(0, 120, &order);
-  const std::size_t second = order.size();
-  Append(120, 30, &order);
-  const std::size_t asked = order.size();
-  Append(30, 90, &order);
-  const SourceRun outcome = RunInOrder(
-      Simulate("loop"), order, Pace::kLockstep, nullptr,
-      {BeforeFrame(second, NewMap{"Annex"}), BeforeFrame(asked - 8, PlaceSignpost{"back", kMiddle, "Hall"}),
-       BeforeFrame(asked - 4, SetSignpostTarget{"sign-1", ""}), BeforeFrame(asked, JoinMap{"Hall"}),
-       BeforeFrame(order.size() - 1, Undo{})});
+  const WayBack way;
+  const SourceRun outcome =
+      RunInOrder(Simulate("loop"), way.order, Pace::kLockstep, nullptr,
+                 {BeforeFrame(way.second, NewMap{"Annex"}),
+                  BeforeFrame(way.asked - 8, PlaceSignpost{"back", kMiddle, "Hall"}),
+                  BeforeFrame(way.asked - 4, SetSignpostTarget{"sign-1", ""}),
+                  BeforeFrame(way.asked, JoinMap{"Hall"}), BeforeFrame(way.order.size() - 1, Undo{})});
   EXPECT_THAT(outcome.map_events, ::testing::Contains(HasSubstr("maps Annex and Hall were joined")));
   ASSERT_EQ(outcome.maps.size(), 1u) << ::testing::PrintToString(outcome.map_events);
   ASSERT_EQ(outcome.maps[0].scene->entities.size(), 1u);
