@@ -35,7 +35,7 @@ std::string InWords(const std::vector<std::string>& names) {
 // The indices of these entities, ascending. Throws Error when there is none with a name, or a name comes
 // twice.
 std::vector<std::size_t> IndicesOf(const Scene& scene, const std::vector<std::string>& names) {
-  if (names.empty()) throw Error("Nothing is named.");
+  if (names.empty()) throw Error("No object is named.");
   std::map<std::string_view, std::size_t> places;
   for (std::size_t i = 0; i < scene.entities.size(); ++i) places.emplace(scene.entities[i].name, i);
   std::set<std::size_t> indices;
@@ -337,7 +337,7 @@ SceneChange RemovePointEdit(const Scene& scene, const std::string& name) {
   return ChangeOf(scene, name, "remove a point of", [&](Entity* entity) {
     Trail& trail = TrailOf(entity, "has no points.");
     if (trail.points.size() <= kMinTrailPoints)
-      throw Error("'" + name + "' needs the points that it has; remove all of it instead.");
+      throw Error("'" + name + "' cannot have fewer points; remove it instead.");
     trail.points.pop_back();
   });
 }

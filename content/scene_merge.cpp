@@ -40,8 +40,9 @@ MapSettings MergeSettings(const MapSettings& base, const MapSettings& mine, cons
   if (theirs == base || theirs == mine) return mine;
   if (mine != base)
     conflicts->push_back(
-        "the direction of up or the scale of the map was changed by both; the other version "
-        "counts, and this one was " +
+        "the up direction or the scale of the map was changed by both; the other version is kept, and this "
+        "one "
+        "was " +
         SettingsToJson(mine).dump());
   return theirs;
 }

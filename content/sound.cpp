@@ -60,7 +60,7 @@ sf_count_t SoundPosition(void* user) {
 SoundFile OpenSound(const std::string& name, SoundBytes* bytes, SoundFormat* format) {
   if (bytes->bytes.size() > kMaxSoundFileBytes)
     Refuse(name, "", "the sound has more than " + std::to_string(kMaxSoundFileBytes >> 20) + " MiB.");
-  if (!IsSoundFile(bytes->bytes)) Refuse(name, "", "is no sound in a WAV, FLAC or Ogg file.");
+  if (!IsSoundFile(bytes->bytes)) Refuse(name, "", "is not a WAV, FLAC or Ogg sound file.");
   SF_VIRTUAL_IO reading{SoundLength, SeekSound, ReadSoundBytes, WriteNoSoundBytes, SoundPosition};
   SF_INFO info{};
   SoundFile file(sf_open_virtual(&reading, SFM_READ, &info, bytes));

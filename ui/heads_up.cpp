@@ -31,7 +31,7 @@ const char* StateText(TrackingState state) {
     case TrackingState::kLost:
       return "Lost";
     case TrackingState::kRelocalized:
-      return "Position recovered";
+      return "Relocalized";
     case TrackingState::kDropped:
       return "Frame skipped";
   }

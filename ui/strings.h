@@ -32,13 +32,13 @@ inline constexpr const char* kStarting = "Move the camera sideways, slowly.";
 // Section of the current map's space.
 inline constexpr const char* kSpace = "Floor, scale and entrance";
 inline constexpr const char* kNoMapForSpace = "There is no current map.";
-inline constexpr const char* kFloorEstimated = "Which way is up is estimated from how the camera was held.";
+inline constexpr const char* kFloorEstimated = "The up direction is estimated from how the camera was held.";
 inline constexpr const char* kFloorKnown = "The floor is known. Objects stand upright on it.";
 inline constexpr const char* kPickFloor = "Show the floor…";
 inline constexpr const char* kClickFloor = "Click on the floor or on a table in the image. Escape cancels.";
 inline constexpr const char* kForgetFloor = "Estimate it again";
 inline constexpr const char* kScaleUnknown =
-    "How large the map is cannot be seen. Measure something in it, and models get their true size.";
+    "The scale of the map is unknown. Measure a length in it to give models their true size.";
 inline constexpr const char* kScaleKnown = "One unit of this map is %.3g m.";
 inline constexpr const char* kLength = "Length (m)";
 inline constexpr const char* kMeasure = "Measure it…";
@@ -97,9 +97,9 @@ inline constexpr const char* kUpright = "Upright, facing me";
 inline constexpr const char* kCaptionHint = "Caption, shown while it plays";
 inline constexpr const char* kClickToPlaceLabel = "Click on what the label is about.";
 inline constexpr const char* kClickToPlaceImage = "Click in the image to place it.";
-inline constexpr const char* kClickToPlaceSound = "Click where the sound shall be heard.";
+inline constexpr const char* kClickToPlaceSound = "Click where the sound should be heard.";
 inline constexpr const char* kClickToPlaceTrail =
-    "Click along the way, point by point. A selected trail goes on; press Escape to end it.";
+    "Click along the way, point by point. Each click extends the selected trail; press Escape to end it.";
 inline constexpr const char* kWriteCaption = "Write its caption first.";
 inline constexpr const char* kChooseImage = "Choose an image file first.";
 inline constexpr const char* kChooseSound = "Choose a sound file first.";
@@ -131,7 +131,8 @@ inline constexpr const char* kLeadsNowhere = "(nowhere)";
 inline constexpr const char* kClickToPlaceSign = "Click in the image to place the signpost.";
 inline constexpr const char* kWriteText = "Write its text first.";
 inline constexpr const char* kChooseFile = "Choose a model file first.";
-inline constexpr const char* kNoModelFile = " is no file that can be placed.";  // After the file's name.
+inline constexpr const char* kNoModelFile =
+    " cannot be placed: it is not a model, image or sound file.";  // After the file's name.
 inline constexpr const char* kDropOnImage = "Drop files onto the image to place them there.";
 inline constexpr const char* kNoSurface = "No surface is known here.";
 
@@ -180,7 +181,7 @@ inline constexpr const char* kLeaveHere = "Leave here: point this way";
 inline constexpr const char* kLeaveHereHelp = "The arrow points where the camera looks now.";
 inline constexpr const char* kRemoveArrow = "Remove arrow";
 inline constexpr const char* kLanguageHint = "Language of the text: de, es, …";
-inline constexpr const char* kNoLanguage = "This is no language tag.";
+inline constexpr const char* kNoLanguage = "This is not a language tag such as de or es-419.";
 inline constexpr const char* kRowWithoutLanguages = "  (no ";  // Followed by "de, es)".
 inline constexpr const char* kTextWithoutLanguages =           // Followed by "de, es.".
     "Other texts of this map are translated. Readers of these languages see this one as it is: ";
@@ -203,7 +204,7 @@ inline constexpr const char* kFitPairs = "Pairs of points: %d";
 inline constexpr const char* kFitNeeds = "Three pairs are needed to fit it, four to bend it.";
 inline constexpr const char* kFitPair = "%d: %.3g map units off";
 inline constexpr const char* kFitPairUnused = "%d: %.3g map units off, left out";
-inline constexpr const char* kFitFull = "No more pairs are possible.";
+inline constexpr const char* kFitFull = "A model can have no more pairs of points.";
 inline constexpr const char* kFitMissed = "This is not on the object.";
 inline constexpr const char* kFitAlign = "Fit";
 inline constexpr const char* kFitBend = "Bend to fit";
@@ -258,7 +259,7 @@ inline constexpr KeyHelp kKeyHelp[] = {
     {"Arrows", "move a little"},
     {"Shift-arrows", "move the pointer; Ctrl-arrows slowly"},
     {"Enter", "click"},
-    {"1 to 7", "the tools, in their order"},
+    {"1 to 8", "the tools, in their order"},
     {"4, 5, 6, 7, 8", "label, image, sound, trail, occluder"},
     {"Delete", "remove"},
     {"Ctrl-D", "duplicate"},

@@ -17,7 +17,7 @@ std::string NamesText(const std::vector<std::string>& names) {
 struct DoneWriter {
   std::string operator()(const NewMap& c) const { return "Started the map " + c.name + "."; }
   std::string operator()(const StopMap&) const { return "Stopped the map."; }
-  std::string operator()(const UseMap& c) const { return "Went on in the map " + c.name + "."; }
+  std::string operator()(const UseMap& c) const { return "Continued the map " + c.name + "."; }
   std::string operator()(const SetPolicy& c) const {
     return "The map " + c.name + " is " + maps::ToString(c.policy) + " now.";
   }
@@ -27,14 +27,16 @@ struct DoneWriter {
   std::string operator()(const RemoveMap& c) const { return "Removed the map " + c.name + "."; }
   std::string operator()(const JoinMap& c) const { return "Comparing the map " + c.name + " with this one…"; }
   std::string operator()(const SetMapUp& c) const {
-    return c.pixel ? "This surface is level now." : "The map finds out again which way is up.";
+    return c.pixel ? "This surface is now the ground of the map."
+                   : "The up direction is now estimated from the keyframes.";
   }
   std::string operator()(const SetMapScale& c) const {
-    return c.length_m > 0 ? "The map is measured in metres now." : "The scale of the map is not known now.";
+    return c.length_m > 0 ? "The map now has a scale: models are placed at their true size."
+                          : "The map now has no scale.";
   }
   std::string operator()(const SetMapEntrance& c) const {
-    return c.here ? "Visitors find the map by this view now."
-                  : "Visitors find the map by its first view now.";
+    return c.here ? "Visitors who look for this map are now shown this view."
+                  : "Visitors who look for this map are now shown its first view.";
   }
   std::string operator()(const PlaceModel& c) const {
     return "Placed " + std::filesystem::path(c.file).filename().string() + ".";
@@ -65,7 +67,9 @@ struct DoneWriter {
   }
   std::string operator()(const AlignEntity& c) const { return "Aligned " + c.name + "."; }
   std::string operator()(const BendEntity& c) const { return "Bent " + c.name + "."; }
-  std::string operator()(const UnbendEntity& c) const { return "Gave " + c.name + " its shape again."; }
+  std::string operator()(const UnbendEntity& c) const {
+    return "Restored the original shape of " + c.name + ".";
+  }
   std::string operator()(const RemoveEntities& c) const { return "Removed " + NamesText(c.names) + "."; }
   std::string operator()(const DuplicateEntities& c) const {
     return "Duplicated " + NamesText(c.names) + ".";
@@ -95,7 +99,7 @@ struct DoneWriter {
       case GuideVisitor::Step::kSkip:
         return "Skipped a stop.";
       case GuideVisitor::Step::kBack:
-        return "Going back to the stop before.";
+        return "Going back to the previous stop.";
       case GuideVisitor::Step::kOpen:
         return "Opened the card of " + NamesText({c.name}) + ".";
       case GuideVisitor::Step::kPress:
@@ -104,12 +108,12 @@ struct DoneWriter {
       case GuideVisitor::Step::kContinue:
         break;
       case GuideVisitor::Step::kRestart:
-        return "The tour begins anew.";
+        return "The tour starts again.";
     }
     return "";
   }
   std::string operator()(const Undo&) const { return "Undid the last change."; }
-  std::string operator()(const Redo&) const { return "Did the change again."; }
+  std::string operator()(const Redo&) const { return "Redid the change."; }
   std::string operator()(const Save&) const { return "Saving all maps."; }
 };
 

@@ -205,7 +205,7 @@ void AddPoseOptions(CLI::App* add, AddOptions* options, const std::vector<CLI::O
       add, "--yaw", 1, -content::kMaxAngle_deg, content::kMaxAngle_deg,
       [=](const auto& n) { options->yaw_deg = n[0]; },
       "Angle about the map's up direction, counter-clockwise seen from above; at 0 the model or image faces "
-      "against the view of the map's first keyframe (default 0)");
+      "the camera of the map's first keyframe (default 0)");
   CLI::Option* const rotation = AddNumbers(
       add, "--rotation", 4, -1.001, 1.001,
       [=](const auto& n) {
@@ -242,13 +242,14 @@ void AddPropertyOptions(CLI::App* add, AddOptions* options, const std::vector<CL
         if (options->direction->norm() < 1e-6)
           throw CLI::ValidationError("--direction", "the direction is too short");
       },
-      "Where one leaves for that map, along the map's axes; the signpost's arrow points there")
+      "Direction in which visitors leave for that map, along the map's axes; the signpost's arrow points in "
+      "it")
       ->type_name("X Y Z")
       ->needs(kinds[1]);
   AddNumbers(
       add, "--offset", 3, -content::kMaxCoordinate, content::kMaxCoordinate,
       [=](const auto& n) { options->offset = Eigen::Vector3d(n[0], n[1], n[2]); },
-      "Where the label's board is, from --at along the map's axes, in map units (default: above)")
+      "Offset of the label's board from --at along the map's axes, in map units (default: above)")
       ->type_name("X Y Z")
       ->needs(kinds[2]);
   add->add_option("--caption", options->caption, "The text that is shown while the sound plays")

@@ -243,20 +243,20 @@ void AddPropertyOptions(CLI::App* edit, EditOptions* options) {
   AddNumbers(
       edit, "--size", 3, 0, content::kMaxOccluderSide,
       [=](const auto& n) { options->size = Eigen::Vector3d(n[0], n[1], n[2]); },
-      "Give an occluder this width, height and depth; the depth counts only of a box")
+      "Give an occluder this width, height and depth; the depth is used only for a box")
       ->type_name("W H D");
   edit->add_option("--extend", options->extend, "Add a point at the end of a trail, in map units")
       ->type_name("\"X Y Z\"");
-  edit->add_flag("--shorten", options->shorten, "Remove the last point of a trail; before --extend");
+  edit->add_flag("--shorten", options->shorten, "Remove the last point of a trail; done before --extend");
   CLI::Option* to = edit->add_option("--to", options->to_map, "Let a signpost lead to this map");
   to->type_name("MAP");
   edit->add_flag("--to-nowhere", options->nowhere, "Let a signpost lead to no map")->excludes(to);
   CLI::Option* direction = AddNumbers(
       edit, "--direction", 3, -content::kMaxCoordinate, content::kMaxCoordinate,
       [=](const auto& n) { options->direction = Eigen::Vector3d(n[0], n[1], n[2]); },
-      "Let the arrow of a signpost point in this direction along the map's axes, where one leaves for the "
-      "map "
-      "that it leads to");
+      "Make the arrow of a signpost point in this direction along the map's axes, in which visitors leave "
+      "for "
+      "the map that it leads to");
   direction->type_name("X Y Z");
   CLI::Option* find = edit->add_flag("--find-direction", options->find_direction,
                                      "Let the arrow of a signpost point to where the map begins that it "
@@ -272,8 +272,9 @@ void AddPropertyOptions(CLI::App* edit, EditOptions* options) {
   CLI::Option* hide = edit->add_flag("--hide", options->hide, "Do not draw them");
   edit->add_flag("--show", options->show, "Draw them again")->excludes(hide);
   edit->add_flag("--lock", options->lock, "Refuse every change but --unlock");
-  edit->add_flag("--unlock", options->unlock, "Allow changes again; before the other changes");
-  edit->add_flag("--duplicate", options->duplicate, "Add a copy of each beside it; before the other changes");
+  edit->add_flag("--unlock", options->unlock, "Allow changes again; done before the other changes");
+  edit->add_flag("--duplicate", options->duplicate,
+                 "Add a copy of each beside it; done before the other changes");
 }
 
 }  // namespace

@@ -74,7 +74,7 @@ void AddEvaluateCommand(CLI::App* program, Invocation* invocation,
                    "for a sequence without a calibration file")
       ->type_name("FILE")
       ->allow_extra_args(false);
-  AddPaceOption(command, pace.get());
+  AddPaceOption(command, pace.get(), "eager");
   AddEngineOption(command, &options->engine);
   const auto when_lost = std::make_shared<std::optional<WhenLost>>();
   AddWhenLostOption(command, when_lost.get(), "new");

@@ -83,8 +83,9 @@ bool LooksEqual(const ShownFrame& a, const ShownFrame& b) {
          a.shown.mapping == b.shown.mapping && a.message == b.message && a.caption == b.caption;
 }
 
-constexpr const char* kPaused = "The recording is paused. Start a map or press Space, and it goes on.";
-constexpr const char* kEnded = "The recording has ended. Its last image stays, so that you can go on.";
+constexpr const char* kPaused = "The recording is paused. Start a map or press Space to continue.";
+constexpr const char* kEnded =
+    "The recording has ended. Its last image stays, and you can still place content in it.";
 
 }  // namespace
 

@@ -80,7 +80,7 @@ void Init(const HubOptions& options) {
   const maps::HubInit init = maps::InitHub(options.hub);
   if (options.verbosity == Verbosity::kQuiet) return;
   if (init.version_before == init.version) {
-    std::printf("The hub is there already, in version %d.\n", init.version);
+    std::printf("The hub already exists, in version %d.\n", init.version);
   } else if (init.version_before == 0) {
     std::printf(
         "The hub is ready%s, in version %d. Add users next: docent hub user add NAME --role curator\n",
@@ -148,7 +148,7 @@ void ListUsers(const HubOptions& options) {
 void Revert(const HubOptions& options) {
   const std::int64_t revision = maps::RevertHubMap(options.hub, options.name, options.revision);
   if (options.verbosity != Verbosity::kQuiet)
-    std::printf("'%s' is as in revision %lld again; this is revision %lld.\n", options.name.c_str(),
+    std::printf("'%s' was put back to revision %lld and saved as revision %lld.\n", options.name.c_str(),
                 static_cast<long long>(options.revision), static_cast<long long>(revision));
 }
 
@@ -159,7 +159,7 @@ void Backup(const HubOptions& options) {
 void Restore(const HubOptions& options) {
   const std::vector<std::string> unknown = maps::RestoreHub(options.hub, options.file);
   if (options.verbosity == Verbosity::kQuiet) return;
-  std::puts("The hub is as in the backup.");
+  std::puts("The hub was restored from the backup.");
   for (const std::string& name : unknown)
     std::printf("This server has no user '%s'; add it again with docent hub user add\n", name.c_str());
 }
@@ -168,7 +168,7 @@ void HandIn(const HubOptions& options) {
   const maps::HandedInVisits visits = maps::HandInVisits(options.hub, options.file);
   if (options.verbosity != Verbosity::kQuiet) std::printf("Records of visits handed in: %zu\n", visits.added);
   if (visits.skipped > 0)
-    std::fprintf(stderr, "Warning: lines that are no records of visits were left out: %zu in '%s'\n",
+    std::fprintf(stderr, "Warning: %zu lines in '%s' are not records of visits and were left out\n",
                  visits.skipped, options.file.c_str());
 }
 
@@ -240,7 +240,8 @@ void AddHubCommand(CLI::App* program, Invocation* invocation) {
       group, invocation, options, "status", "Show who you are on a hub, what it has, and the last changes",
       "docent hub status --hub postgresql://anna@museum.example/docent", Status);
   AddHubOption(status, &options->hub)->required();
-  status->add_option("--changes", options->changes, "How many changes")->check(CLI::Range(0, 100000));
+  status->add_option("--changes", options->changes, "Number of the newest changes to show (default 10)")
+      ->check(CLI::Range(0, 100000));
   status->add_flag("--json", options->as_json, "Print JSON");
   CLI::App* revert =
       AddHubSubcommand(group, invocation, options, "revert", "Put a map back to an earlier revision",

@@ -70,7 +70,9 @@ void Refresh(const HubLibrary& library) {
   try {
     // The hub would refuse the change only after it was made in the copy.
     if (library.use == LibraryUse::kChange && maps::StatusOf(library.address, 0).role == "visitor")
-      throw Error("A visitor of the hub may read its library and not change it.");
+      throw Error(
+          "Your user has the role visitor on this hub and may not change its library; ask an admin of the "
+          "hub for a user with the role curator.");
     const maps::SyncReport report = maps::Pull(SyncOptionsOfCopy(library));
     for (const std::string& line : report.lines)
       spdlog::log(report.problems > 0 ? spdlog::level::warn : spdlog::level::info, "{}", OneLine(line));

@@ -45,7 +45,7 @@ std::string ReadKioskCode(const std::filesystem::path& file) {
   while (!code.empty() && (code.back() == '\n' || code.back() == '\r')) code.pop_back();
   const bool digits = std::all_of(code.begin(), code.end(), [](char c) { return c >= '0' && c <= '9'; });
   if (!digits || code.size() < kLeast || code.size() > kMost)
-    throw Error("'" + file.string() + "' holds no code: write 4 to 12 digits, and nothing else, in it.");
+    throw Error("'" + file.string() + "' must contain a code of 4 to 12 digits and nothing else.");
   return code;
 }
 

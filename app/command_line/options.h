@@ -89,7 +89,7 @@ struct EvaluateOptions {
   std::vector<std::filesystem::path> calibrations;  // By sequence; missing ones are searched in its folder.
   Pace pace = Pace::kEager;
   EngineKind engine = EngineKind::kHybrid;
-  // Assumes that pure rotations are about the camera centre, as [HYBRID] does: RotationCenter is disabled,
+  // Assumes that pure rotations are about the camera centre, as hybrid-slam does: RotationCenter is disabled,
   // and the test for pure rotation has no residual limit of its own. For comparison.
   bool turn_about_camera = false;
   bool leave_loops_open = false;  // Disables loop closing. For comparison.

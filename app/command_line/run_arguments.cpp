@@ -74,10 +74,11 @@ void AddMetresOption(CLI::App* command, const std::string& option, double least,
       ->type_name("METRES");
 }
 
-void AddPaceOption(CLI::App* command, std::optional<Pace>* pace) {
+void AddPaceOption(CLI::App* command, std::optional<Pace>* pace, const std::string& otherwise) {
   AddChoice<Pace>(command, "--pace", pace,
                   "How images are processed: lockstep is reproducible, eager processes every image, realtime "
-                  "skips late images",
+                  "skips late images (default: " +
+                      otherwise + ")",
                   {{"lockstep", Pace::kLockstep}, {"eager", Pace::kEager}, {"realtime", Pace::kRealtime}});
 }
 
@@ -108,7 +109,7 @@ void AddSeedOption(CLI::App* command, std::uint64_t* seed) {
               throw CLI::ValidationError("--seed", "'" + text + "' is not a whole number of 0 or more");
             *seed = static_cast<std::uint64_t>(*value);
           },
-          "Seed of all random choices")
+          "Seed of all random choices (default 1)")
       ->type_name("N");
 }
 
@@ -158,7 +159,7 @@ void AddRunArguments(CLI::App* command, const std::string& auto_calibration, Run
                    "Start at this time (seconds after the first image)");
   AddSecondsOption(command, "--until", &run->cameras.until,
                    "Stop at this time (seconds after the first image)");
-  AddPaceOption(command, &run->pace);
+  AddPaceOption(command, &run->pace, "realtime with a camera or a window, else eager");
   AddEngineOption(command, &run->engine);
   AddSeedOption(command, &run->seed);
   AddMemoryOption(command, &run->memory_budget_bytes);
@@ -185,9 +186,8 @@ void AddRunArguments(CLI::App* command, const std::string& auto_calibration, Run
                                          "'" + text + "' is not a language tag such as de or es-419");
             run->language = tag;
           },
-          "Language in which texts are shown that have it, and in which tour speaks to visitors: en, de, es "
-          "or "
-          "ar (default: that of the locale)")
+          "Language of the texts, where they have a variant in it, and of the sentences for visitors on a "
+          "tour (en, de, es or ar; default: that of the locale)")
       ->type_name("TAG");
   command->add_flag("--headless", run->headless, "Open no window");
   command->add_option("--output", run->output, "Folder for trajectory, frames and events")->type_name("DIR");
@@ -198,8 +198,8 @@ void AddOcclusionOption(CLI::App* command, Occlusion* occlusion) {
   AddChoice<Occlusion>(
       command, "--occlusion", occlusion,
       "What hides content behind it: nothing (off); the occluders that authors place (proxies); also the "
-      "surfaces of the map, which docent maps densify and, while a map is idle, an author's session compute, "
-      "but not where an occluder stands for the same surface (map; default)",
+      "surfaces of the map, which docent maps densify computes, as does an author's session while the map is "
+      "idle (map; default). Where an occluder stands for a surface, the surface is ignored",
       {{"off", Occlusion::kOff}, {"proxies", Occlusion::kProxies}, {"map", Occlusion::kMap}});
 }
 

@@ -14,9 +14,10 @@ namespace docent::app {
 
 inline constexpr double kMinLength_m = 1e-6;  // of what a person measured
 
-void AddPaceOption(CLI::App* command, std::optional<Pace>* pace);
+// `otherwise` is the default's name in the help text, here and below.
+void AddPaceOption(CLI::App* command, std::optional<Pace>* pace, const std::string& otherwise);
 void AddEngineOption(CLI::App* command, EngineKind* engine);
-// Adds --when-lost. `otherwise` is the default's name in the help text.
+// Adds --when-lost.
 void AddWhenLostOption(CLI::App* command, std::optional<WhenLost>* when_lost, const std::string& otherwise);
 void AddSeedOption(CLI::App* command, std::uint64_t* seed);
 // Adds an option whose value is a number of seconds, 0 or more.

@@ -51,7 +51,7 @@ maps::Tour FindTour(const maps::Library& library, const std::string& name) {
   for (const maps::Tour& tour : library.Tours(&damaged)) {
     if (tour.name != name) continue;
     if (!tour.stops.empty()) return tour;
-    throw Error("The tour '" + name + "' has no stops; docent maps tour edit gives it some.");
+    throw Error("The tour '" + name + "' has no stops; add some with docent maps tour edit.");
   }
   throw Error("'" + library.file() + "' has no tour named '" + name + "'.");
 }
@@ -110,7 +110,7 @@ maps::SyncOptions PulledHub(const AuthorOptions& options) {
   try {
     for (const std::string& line : maps::Pull(hub).lines) spdlog::info("{}", line);
   } catch (const maps::HubUnreachable& unreachable) {
-    spdlog::warn("{}; the session goes on with the maps that are here.", unreachable.what());
+    spdlog::warn("{}; the session continues with the maps in the library.", unreachable.what());
   }
   return hub;
 }

@@ -29,7 +29,7 @@ void RunHub::Begin(Session* session) {
 void RunHub::FinishPushing() {
   if (!pusher_ || pusher_->Finish()) return;
   spdlog::warn(
-      "The hub has not got everything. It is saved in the library; docent maps push brings it to the hub.");
+      "Not all changes are on the hub. They are saved in the library; send them with docent maps push.");
 }
 
 void RunHub::LibraryWasSaved() {

@@ -17,9 +17,9 @@ void RunWatch::WatchLoad(std::size_t camera, const engine::TrackedFrame& tracked
   if (!change) return;
   const std::string counts = std::to_string(change->dropped) + " of " + std::to_string(change->images) +
                              " images were skipped in the last seconds";
-  notices->events.push_back(
-      {tracked.frame.time, "load",
-       change->is_slow ? counts + "; the machine is too slow for more" : "it is over; " + counts});
+  notices->events.push_back({tracked.frame.time, "load",
+                             change->is_slow ? counts + "; the machine is too slow to track more"
+                                             : "the machine keeps up again: " + counts});
   if (change->is_slow && camera == 0) notices->sentence = strings_.device_is_slow;
 }
 

@@ -44,8 +44,10 @@ void AddTourCommand(CLI::App* program, Invocation* invocation,
       ->type_name("FILE");
   command->add_flag(
       "--gaze", options->gaze,
-      "For hands that are not free: what stays in the middle of the image for 1.5 s opens its card, whose "
-      "pages turn by themselves, and who looks elsewhere closes it");
+      "Open cards by gaze, for visitors whose hands are not free: a card opens for an object that stays in "
+      "the "
+      "middle of the image for 1.5 s, its pages turn by themselves, and it closes when the visitor looks "
+      "elsewhere");
   command
       ->add_option(
           "--log", options->log,
@@ -53,11 +55,12 @@ void AddTourCommand(CLI::App* program, Invocation* invocation,
           "and where the camera was lost (see docent report)")
       ->type_name("DIR");
   command
-      ->add_option(
-          "--kiosk", options->kiosk,
-          "Full screen for a device that visitors take: it ends only by the code in this file (4 to 12 "
-          "digits, typed), starts again after a failure, and forgets a visit when it is left for two "
-          "minutes")
+      ->add_option("--kiosk", options->kiosk,
+                   "Run in full screen on a device that visitors take: only typing the code in this file (4 "
+                   "to 12 digits) "
+                   "ends the program, it restarts after a failure, and a new visit begins when the device "
+                   "was left for "
+                   "two minutes")
       ->type_name("FILE");
   AddHubOption(command, &options->hub)
       ->description(

@@ -50,7 +50,7 @@ struct MapResult {
   std::optional<double> rotation_rmse_deg;  // After the rotation that aligns the orientations best.
   std::optional<double>
       rotation_drift_deg;  // Error of the rotation from the first to the last frame with a pose.
-  // Component of that drift about the axis of the true rotation, as in [HYBRID] 7.3; positive when the
+  // Component of that drift about the axis of the true rotation, as in hybrid-slam §7.3; positive when the
   // tracked rotation is too large. Empty when the true rotation is too small to have an axis.
   std::optional<double> axis_drift_deg;
   std::optional<Eigen::Vector2d> readout_s = std::nullopt;  // see MapRecord

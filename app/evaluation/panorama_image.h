@@ -8,7 +8,7 @@
 
 #include "engine/map/map_snapshot.h"
 
-// Stitches the keyframes of a panorama map into one image ([HYBRID] Fig. 6). For reports; any thread.
+// Stitches the keyframes of a panorama map into one image (hybrid-slam Fig. 6). For reports; any thread.
 namespace docent::app {
 
 struct StitchOptions {

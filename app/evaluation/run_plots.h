@@ -5,7 +5,7 @@
 
 #include "app/evaluation/evaluated_run.h"
 
-// Plots of a run as inline SVG, similar to those of [HYBRID] 6. Figure numbers refer to that paper.
+// Plots of a run as inline SVG, similar to those of hybrid-slam §6. Figure numbers refer to that paper.
 namespace docent::app {
 
 // Upper limits of the vertical axes, so that the plots of two engines have equal scales.

@@ -72,7 +72,7 @@ void WarnOfLostPages() {
   static std::atomic<bool> warned{false};
   if (GuardedPages::Lost() == 0 || warned.exchange(true)) return;
   spdlog::warn(
-      "The disk cannot return parts of the images of keyframes, which count as black from now on. Check the "
+      "Parts of some keyframe images cannot be read from the disk and are black from now on. Check the "
       "disk.");
 }
 

@@ -129,8 +129,9 @@ std::string TextOf(const engine::BundleSummary& summary) {
 std::string TextOf(const engine::ClosedLoop& loop) {
   return Printed(
       "drift of %.1f %% of the path, %.2f degrees, %+.1f %% in scale; keyframe %u matches keyframe %u: %zu "
-      "of "
-      "%d points, %zu duplicates, %d in reverse, %d points fused",
+      "of %d map points found, %zu pairs of duplicate points, %d inliers in the reverse check; %d pairs "
+      "fused "
+      "in total",
       100 * loop.drift, loop.rotation * 180 / std::numbers::pi, 100 * (loop.scale - 1), loop.keyframe,
       loop.place, loop.found, loop.expected, loop.duplicates, loop.reverse_inliers, loop.fused);
 }
@@ -176,7 +177,7 @@ std::string TextOf(engine::Hint hint) {
 
 std::string TextOf(const engine::RigEstimate& rig) {
   return Printed("%s, baseline %.4g (sigma %.2g), rotation %.4g degrees (sigma %.2g)",
-                 rig.rigid ? "rigid" : "articulated", rig.Baseline(), rig.position_sigma,
+                 rig.rigid ? "rigid" : "not rigid", rig.Baseline(), rig.position_sigma,
                  rig.second_from_first.rotation.Angle() * 180 / std::numbers::pi, rig.rotation_sigma_deg);
 }
 
@@ -212,7 +213,7 @@ std::string TextOf(engine::JoinRefusal refusal, const engine::MapOverlap& overla
     case JoinRefusal::kNoOverlap:
       return ReasonOf(overlap);
     case JoinRefusal::kTooMuchDrift:
-      return "one map would have to be bent too far to fit the other";
+      return "one of the maps has drifted too far to fit the other";
     case JoinRefusal::kInterrupted:
       return "the joining was interrupted";
   }

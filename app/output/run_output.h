@@ -12,8 +12,8 @@
 #include "engine/base/time.h"
 #include "engine/tracking/tracked_frame.h"
 
-// The files of a run in `--output DIR`: trajectory.txt, frames.csv and events.csv, in the formats that
-// command-line.md fixes. Poses are written as camera in map: position in map units, quaternion x y z w.
+// The files of a run in `--output DIR`: trajectory.txt, frames.csv and events.csv, in the formats of
+// docs/output-files.md. Poses are written as camera in map: position in map units, quaternion x y z w.
 namespace docent::app {
 
 // Something that happened besides a frame: a keyframe, a map switch, a command, a save, a warning.

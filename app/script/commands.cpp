@@ -60,7 +60,7 @@ std::string ScaleProblem(double scale) {
 }
 
 std::string NamesProblem(const std::vector<std::string>& names) {
-  if (names.empty()) return "expected the name of a model or a signpost";
+  if (names.empty()) return "expected the name of an entity";
   if (names.size() > content::kMaxEntities) return "there are more names than a map can hold";
   std::set<std::string_view> seen;
   for (const std::string& name : names) {

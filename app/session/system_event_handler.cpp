@@ -64,9 +64,9 @@ std::shared_ptr<const engine::MapSnapshot> WithoutImages(const engine::MapSnapsh
 std::string TextOf(const engine::CalibrationMonitor::Mismatch& mismatch) {
   const auto radius = [](double px) { return std::to_string(std::lround(px)); };
   const auto pixels = [](double px) { return FormatNumber(std::round(10 * px) / 10, 3); };
-  return "The calibration does not fit this lens: " + radius(mismatch.outward_radius_px) +
-         " pixels from the image centre, points appear " + pixels(mismatch.outward_px) +
-         " pixels too far out, and " + radius(mismatch.inward_radius_px) + " pixels from it " +
+  return "The calibration does not fit this lens: points " + radius(mismatch.outward_radius_px) +
+         " pixels from the image centre appear " + pixels(mismatch.outward_px) +
+         " pixels too far out, and points " + radius(mismatch.inward_radius_px) + " pixels from it appear " +
          pixels(mismatch.inward_px) +
          " pixels too far in. Calibrate the camera again with `docent calibrate`.";
 }
@@ -145,7 +145,7 @@ void SystemEventHandler::Handle(const engine::SystemEvent& event, const engine::
   const std::string before = state_.NameOf(what.lost_in);
   const std::string name = state_.FreeMapName(before);
   state_.AddMap(event.map, name);
-  state_.AddEvent(event.time, "map", "began " + name + ": the camera was lost in " + before);
+  state_.AddEvent(event.time, "map", "started " + name + ": the camera was lost in " + before);
 }
 
 // Maintenance goes on: its thread has a lower priority than those of the active map.

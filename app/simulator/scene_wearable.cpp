@@ -5,8 +5,8 @@
 #include "app/simulator/scene.h"
 #include "app/simulator/scene_parts.h"
 
-// A person with two cameras at the table of the furnished room: one in the hand, one on the shoulder ([PTAMM]
-// 4, Fig. 4 and 5). Both scenes show the same walk, so that a pair of sources simulates a wearable.
+// A person with two cameras at the table of the furnished room: one in the hand, one on the shoulder (ptamm
+// §4, Fig. 4 and 5). Both scenes show the same walk, so that a pair of sources simulates a wearable.
 namespace docent::app {
 namespace {
 

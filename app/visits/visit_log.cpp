@@ -77,12 +77,12 @@ std::uint64_t CountFrom(const Json& json, std::uint64_t most) {
 
 std::string NameFrom(const Json& json) {
   if (!json.is_string() || json.get_ref<const std::string&>().size() > kMaxName)
-    throw Error("a name is wrong");
+    throw Error("a name is not valid");
   return json.get<std::string>();
 }
 
 Eigen::Vector3d PlaceFrom(const Json& json) {
-  if (!json.is_array() || json.size() != 3) throw Error("a place is wrong");
+  if (!json.is_array() || json.size() != 3) throw Error("a place is not valid");
   Eigen::Vector3d place;
   for (int i = 0; i < 3; ++i) place[i] = NumberFrom(json[static_cast<std::size_t>(i)], -kMaxPlace, kMaxPlace);
   return place;
@@ -90,16 +90,16 @@ Eigen::Vector3d PlaceFrom(const Json& json) {
 
 const Json& ListIn(const Json& json, const char* name) {
   const Json& list = json.at(name);
-  if (!list.is_array()) throw Error(std::string("'") + name + "' is no list");
+  if (!list.is_array()) throw Error(std::string("'") + name + "' is not a list");
   return list;
 }
 
 VisitRecord VisitFrom(const Json& json) {
   if (!json.is_object() || json.value("docent_visit", 0) != 1)
-    throw Error("it is no visit of a version that is known");
+    throw Error("its version is unknown to this program");
   VisitRecord visit;
   const auto begin = ParseTime(NameFrom(json.at("begin")));
-  if (!begin) throw Error("the time is wrong");
+  if (!begin) throw Error("the time is not valid");
   visit.begin = *begin;
   visit.duration_s = NumberFrom(json.at("seconds"), 0, kMaxSeconds);
   visit.images = CountFrom(json.at("images"), std::uint64_t{1} << 40);
@@ -114,7 +114,7 @@ VisitRecord VisitFrom(const Json& json) {
     visit.losses.push_back({NameFrom(loss.at("map")), NumberFrom(loss.at("begin"), 0, kMaxSeconds),
                             NumberFrom(loss.at("seconds"), 0, kMaxSeconds), PlaceFrom(loss.at("place"))});
   for (const Json& step : ListIn(json, "path")) {
-    if (visit.stays.empty()) throw Error("there is a way without a stay");
+    if (visit.stays.empty()) throw Error("the path has no stay");
     visit.path.push_back({static_cast<std::uint32_t>(CountFrom(step.at("stay"), visit.stays.size() - 1)),
                           PlaceFrom(step.at("place"))});
   }
@@ -172,9 +172,9 @@ VisitRecord VisitFromJson(std::string_view text, const std::string& where) {
     if (text.size() > kMaxRecordBytes) throw Error("it is too long");
     return VisitFrom(Json::parse(text));
   } catch (const Json::exception&) {
-    throw Error(where + ": this is no record of a visit.");
+    throw Error(where + ": this is not a record of a visit.");
   } catch (const Error& error) {
-    throw Error(where + ": this is no record of a visit: " + error.what() + ".");
+    throw Error(where + ": this is not a record of a visit: " + error.what() + ".");
   }
 }
 

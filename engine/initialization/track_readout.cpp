@@ -27,9 +27,9 @@ BetterAxis FindBetterAxis(const std::array<TrackBundle, 2>& bundles) {
 
 std::optional<std::string> TrackReadoutOptions::Validate() const {
   return OptionCheck()
-      .AtLeast(min_corners, 8, "number of corners that tell the readout time")
-      .AtLeast(bundle.max_corners, min_corners, "largest number of corners that tell the readout time")
-      .AtLeast(min_images, 4, "number of images that tell the readout time")
+      .AtLeast(min_corners, 8, "number of corners used to estimate the readout time")
+      .AtLeast(bundle.max_corners, min_corners, "largest number of corners used to estimate the readout time")
+      .AtLeast(min_images, 4, "number of images used to estimate the readout time")
       .Positive(bundle.prior_sigma_s, "sigma of an unknown readout time")
       .Positive(bundle.min_noise_px, "smallest noise of a corner")
       .AtLeast(systematic_s_per_px, 0, "systematic error of a readout time")

@@ -33,7 +33,7 @@ struct MapperEvent {
   // A panorama keyframe now has a position relative to finite points.
   struct KeyFrameLocalized {
     KeyFrameId keyframe = kNoId;
-    bool by_descriptors = false;  // and not by active search
+    bool by_descriptors = false;  // and not by guided search
   };
   struct InfinitePointsTriangulated {
     std::size_t triangulated = 0;

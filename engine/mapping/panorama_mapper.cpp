@@ -80,7 +80,7 @@ bool PanoramaMapper::LocalizeAgain() {
     TryToLocalize(&waiting, finite);
     return true;
   }
-  // If active search failed, the pose may be too far off; matching descriptors does not depend on it.
+  // If guided search failed, the pose may be too far off; matching descriptors does not depend on it.
   const auto due = std::find_if(to_localize_.begin(), to_localize_.end(),
                                 [](const Unlocalized& waiting) { return waiting.appearance_due; });
   if (due == to_localize_.end()) return false;

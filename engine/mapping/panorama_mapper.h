@@ -48,7 +48,7 @@ class PanoramaMapper {
   struct Unlocalized {
     KeyFrameId keyframe = kNoId;
     std::size_t tried_with_points = 0;
-    bool appearance_due = false;  // active search failed, and descriptor matching has not been tried since
+    bool appearance_due = false;  // guided search failed, and descriptor matching has not been tried since
   };
 
   void TryToLocalize(Unlocalized* waiting, std::size_t finite);

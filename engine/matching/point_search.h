@@ -13,7 +13,7 @@
 #include "engine/map/map_snapshot.h"
 #include "engine/vision/patch.h"
 
-// Active search (ptamm §2.1): the patch of a map point is warped to the present view and searched near the
+// Guided search (ptamm §2.1): the patch of a map point is warped to the present view and searched near the
 // pixel where the point projects. The tracker uses it for every frame, the mapper for guided matching in
 // existing keyframes. Not thread safe: each thread owns a searcher.
 namespace docent::engine {

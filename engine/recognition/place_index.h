@@ -14,7 +14,7 @@
 
 namespace docent::engine {
 
-// Finds the keyframes of all maps whose appearance is similar to an image ([PTAMM] 3.2 and 3.3). It combines
+// Finds the keyframes of all maps whose appearance is similar to an image (ptamm §3.2, §3.3). It combines
 // two methods: small blurry images, of which all are compared (thumbnail_array.h), and visual words, of which
 // only the keyframes that share some are read (inverted_file.h). It stores only this appearance, so that all
 // maps of a large library can be searched while only few are in memory. The owner calls SetMap with the

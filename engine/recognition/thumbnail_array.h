@@ -10,7 +10,7 @@
 #include "engine/map/map_snapshot.h"
 #include "engine/vision/small_blurry_image.h"
 
-// Stores small blurry images contiguously in memory and searches them exhaustively ([PTAMM] 3.2). They use
+// Stores small blurry images contiguously in memory and searches them exhaustively (ptamm §3.2). They use
 // one byte per pixel, so that those of a museum fit in a wearable's memory, and have two resolutions, so that
 // all are compared in milliseconds. A camera at a keyframe's position with a slightly different orientation
 // sees a shifted image, so the search tries all shifts of up to a sixth of the image. The comparison is

@@ -61,7 +61,7 @@ class VocabularyTree {
   std::vector<Descriptor> centers_;  // by level, then node
 };
 
-// The vocabulary that is part of the program, generated from vocabulary.bin by the build (the README
+// The vocabulary that is part of the program, generated from vocabulary.bin by the build (docs/guide.md
 // describes its training data).
 const VocabularyTree& DefaultVocabulary();
 

@@ -20,11 +20,11 @@ std::shared_ptr<const MapSnapshot> BetterMapSearch::Continue(const PoseSearch& s
 std::optional<FoundPose> BetterMapSearch::SearchOtherPlace(const PoseSearch& search, bool pending,
                                                            double visible_inlier_ratio, TrackedFrame* out) {
   if (!pending) return std::nullopt;
-  ++frames_since_recovery_;
+  ++frames_since_relocalization_;
   if (visible_inlier_ratio >= options_.poor_visible_ratio) return std::nullopt;
   // Less and less often: the place may have changed permanently.
   constexpr unsigned kMaxInterval = 32;
-  const unsigned frames = frames_since_recovery_;
+  const unsigned frames = frames_since_relocalization_;
   if (frames < 2 || !(std::has_single_bit(frames) || frames % kMaxInterval == 0)) return std::nullopt;
   RelocalizationResult unused;
   const auto other =

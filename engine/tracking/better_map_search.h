@@ -16,7 +16,7 @@ class BetterMapSearch {
   explicit BetterMapSearch(const TrackerOptions& options) : options_(options) {}
 
   // The camera was relocalized.
-  void Restart() { frames_since_recovery_ = 0; }
+  void Restart() { frames_since_relocalization_ = 0; }
 
   // To be called once per tracked frame, each where it applies. out: the frame as it was tracked;
   // visible_inlier_ratio: of its pose.
@@ -40,7 +40,7 @@ class BetterMapSearch {
 
   TrackerOptions options_;
   int frames_since_search_ = 0;
-  unsigned frames_since_recovery_ = 0;  // while the relocalization is unconfirmed
+  unsigned frames_since_relocalization_ = 0;  // while the relocalization is unconfirmed
 };
 
 }  // namespace docent::engine

@@ -62,8 +62,8 @@ std::optional<std::string> MapTrackerOptions::Validate() const {
   return OptionCheck()
       .AtLeast(min_coarse, 0, "number of coarse points")
       .AtLeast(max_coarse, min_coarse, "largest number of coarse points")
-      .AtLeast(max_recovery, 1, "number of points after a loss")
-      .Positive(recovery_inlier_px, "distance of an inlier after a loss")
+      .AtLeast(max_relocalization, 1, "number of points after a loss")
+      .Positive(relocalization_inlier_px, "distance of an inlier after a loss")
       .AtLeast(max_fine, 1, "number of fine points")
       .Positive(coarse_radius_px, "coarse search radius")
       .Positive(wide_radius_px, "wide search radius")
@@ -234,7 +234,7 @@ void MapTracker::Repredict(const Rigid3& camera_from_map) {
 std::optional<Rigid3> MapTracker::PoseFromPatches(const ImageFeatures& features, Random* random) {
   std::vector<std::uint32_t> chosen = coarse_;
   for (const std::uint32_t index : fine_) {
-    if (static_cast<int>(chosen.size()) >= options_.max_recovery) break;
+    if (static_cast<int>(chosen.size()) >= options_.max_relocalization) break;
     if (candidates_[index].predicted.level >= 1) chosen.push_back(index);
   }
   Search(chosen, features, options_.wide_radius_px, false);
@@ -247,7 +247,7 @@ std::optional<Rigid3> MapTracker::PoseFromPatches(const ImageFeatures& features,
   }
   AbsolutePoseOptions options;
   options.pixel_angle = camera_->PixelAngle();
-  options.inlier_px = options_.recovery_inlier_px;
+  options.inlier_px = options_.relocalization_inlier_px;
   options.min_inliers = options_.min_coarse;
   options.seed = random->Next();
   const auto pose = EstimateAbsolutePose(rays, points, options);
@@ -265,15 +265,15 @@ MapTrackResult MapTracker::Track(const MapSnapshot& map, const ImageFeatures& fe
   measurements_.clear();
   CollectVisible(map, predicted, random);
 
-  if (effort == Effort::kRecovery) {
+  if (effort == Effort::kRelocalization) {
     // RANSAC needs finite points. Infinite points are searched from the prediction, which includes the
     // rotation of the whole image.
     if (!nearby_.infinite().empty() && panorama_ != kNoId && visible_finite_ < options_.min_coarse)
       return Track(map, features, predicted, Effort::kWide, random);
-    const auto recovered = PoseFromPatches(features, random);
-    if (!recovered) return result;
+    const auto pose = PoseFromPatches(features, random);
+    if (!pose) return result;
     ForgetLastFrame();
-    return Track(map, features, *recovered, Effort::kStandard, random);
+    return Track(map, features, *pose, Effort::kStandard, random);
   }
   const bool wide = effort == Effort::kWide;
   Search(coarse_, features, wide ? options_.wide_radius_px : options_.coarse_radius_px, false);
@@ -363,7 +363,7 @@ FrameInspection MapTracker::Inspect(const Rigid3& camera_from_map) const {
   inspection.predicted = predicted_;
   inspection.visible_points = visible_finite_;
   inspection.panorama = panorama_;
-  // After a recovery search without a pose not all candidates were attempted.
+  // After a relocalization search without a pose not all candidates were attempted.
   std::vector<std::uint32_t> order = coarse_;
   order.insert(order.end(), fine_.begin(), fine_.end());
   if (order.size() != attempts_.size()) return inspection;

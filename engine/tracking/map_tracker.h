@@ -23,10 +23,10 @@
 namespace docent::engine {
 
 struct MapTrackerOptions {
-  int max_coarse = 60;            // ptamm §2.1: up to 50 on the top levels
-  int min_coarse = 12;            // With fewer points found the coarse stage does not update the pose.
-  int max_recovery = 220;         // patches of the upper levels that are searched after a loss
-  double recovery_inlier_px = 5;  // level-0 pixels; keypoints of upper levels are no more accurate
+  int max_coarse = 60;                  // ptamm §2.1: up to 50 on the top levels
+  int min_coarse = 12;                  // With fewer points found the coarse stage does not update the pose.
+  int max_relocalization = 220;         // patches of the upper levels that are searched after a loss
+  double relocalization_inlier_px = 5;  // level-0 pixels; keypoints of upper levels are no more accurate
   int max_fine = 600;  // ptamm §2.1 allows 1000; above 600 no improvement of the pose was measurable
   float coarse_radius_px = 30;  // search radius of the coarse stage, level-0 pixels
   float wide_radius_px = 70;    // coarse radius of the second attempt, before a frame counts as lost
@@ -88,7 +88,7 @@ class MapTracker {
     kWide,      // after unexpected motion: larger search radii
     // After a loss, when the prediction may be wrong: largest search radius on the upper levels, then a pose
     // by RANSAC.
-    kRecovery,
+    kRelocalization,
   };
   // Estimates the pose. matches() returns the matches of the last call.
   MapTrackResult Track(const MapSnapshot& map, const ImageFeatures& features, const Rigid3& predicted,

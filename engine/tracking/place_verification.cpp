@@ -26,7 +26,7 @@ VerifiedPlace PlaceVerification::Try(const Query& query, const AlignedPlace& pla
   tracker_.Clear();
   tracker_.EnablePanorama(keyframe ? keyframe->panorama : kNoId);
   const MapTrackResult result = tracker_.Track(*candidate.map, *query.image.features, place.camera_from_map,
-                                               MapTracker::Effort::kRecovery, query.random);
+                                               MapTracker::Effort::kRelocalization, query.random);
   return {place, result, tracker_.panorama()};
 }
 

@@ -43,7 +43,7 @@ bool PoseCriteria::IsGood(const MapTrackResult& result) const {
 
 bool PoseCriteria::HoldsTrack(const MapTrackResult& result) const {
   if (options_.build_maps || !result.converged || result.observed != ObservedMotion::kSixDof) return false;
-  if (result.occupied_cells < options_.min_recovery_cells || result.Quality() < options_.lost_quality)
+  if (result.occupied_cells < options_.min_relocalization_cells || result.Quality() < options_.lost_quality)
     return false;
   if (result.inliers >= options_.min_inliers) return FitsWell(result);
   return result.inliers >= options_.min_tight_inliers && result.sigma <= options_.max_tight_sigma;
@@ -61,12 +61,12 @@ RejectionReason PoseCriteria::RejectionReasonOf(const MapTrackResult& result, co
   const bool fits = comparison == PatchComparison::kTolerant &&
                     result.inliers >= options_.min_tolerant_inliers &&
                     result.sigma <= options_.max_tolerant_sigma;
-  const double min_quality = fits ? options_.lost_quality : options_.min_recovery_quality;
-  if (result.inliers < options_.min_recovery_inliers || result.Quality() < min_quality)
+  const double min_quality = fits ? options_.lost_quality : options_.min_relocalization_quality;
+  if (result.inliers < options_.min_relocalization_inliers || result.Quality() < min_quality)
     return RejectionReason::kFewPoints;
   if (!result.converged || result.sigma > options_.max_sigma || !FitsRotation(result, map))
     return RejectionReason::kPoorFit;
-  if (result.occupied_cells < options_.min_recovery_cells) return RejectionReason::kClustered;
+  if (result.occupied_cells < options_.min_relocalization_cells) return RejectionReason::kClustered;
   return IsContradicted(result) ? RejectionReason::kContradicted : RejectionReason::kNone;
 }
 

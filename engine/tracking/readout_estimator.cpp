@@ -44,8 +44,8 @@ std::optional<std::string> ReadoutOptions::Validate() const {
       .AtLeast(min_readout_s, 0, "smallest readout time")
       .AtLeast(min_change_s, 0, "change of a readout time")
       .AtLeast(min_rate, 0, "rotation rate")
-      .AtLeast(min_inliers, 8, "number of points that tell the readout time")
-      .AtLeast(max_points, min_inliers, "largest number of points that tell the readout time")
+      .AtLeast(min_inliers, 8, "number of points used to estimate the readout time")
+      .AtLeast(max_points, min_inliers, "largest number of points used to estimate the readout time")
       .fault();
 }
 

@@ -45,7 +45,7 @@ Relocalizer::Attempt Relocalizer::SearchNearby(const PoseSearch& search, Tracked
   const auto track = [&](MapTracker::Effort effort) {
     return search.pose->TryFrom(*search.map, search.image, guess, effort, search.random);
   };
-  MapTrackResult result = track(MapTracker::Effort::kRecovery);
+  MapTrackResult result = track(MapTracker::Effort::kRelocalization);
   const RejectionReason rejection = search.RejectionReasonOf(result, *search.map);
   if (!options_.build_maps && !search.has_odometry) {
     // With too few patches on the upper levels for a pose, the predicted pose may still be good.

@@ -20,7 +20,7 @@
 
 namespace docent::engine {
 
-// The tracking state shown to the user. ToString returns the names of command-line.md.
+// The tracking state shown to the user. ToString returns the names of docs/output-files.md.
 enum class TrackingState : std::uint8_t {
   kInitializing,
   kSixDof,

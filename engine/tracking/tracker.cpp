@@ -166,8 +166,8 @@ void Tracker::TrackMap(const Frame& frame, const PlaceFinder* places, TrackedFra
   // Where the map has few points, or only the rotation is known, a pose that comes from the points of the
   // visit as well is more certain.
   std::optional<MapTrackResult> continued;
-  const bool certain =
-      estimate.outcome == Outcome::kPose && estimate.result.finite_inliers >= options_.min_recovery_inliers;
+  const bool certain = estimate.outcome == Outcome::kPose &&
+                       estimate.result.finite_inliers >= options_.min_relocalization_inliers;
   if (!options_.build_maps && !certain) {
     odometry_.Begin(pose_);
     frames_of_odometry_ = 0;

@@ -72,9 +72,9 @@ struct TrackerOptions {
   // waiting, where slow cameras get up to 73 % more keyframes; 0.8 loses a third more of the images than 0.9.
   double min_kept_ratio = 0.9;
   // Conditions on a pose that was found after a loss (ptamm §6.3).
-  int min_recovery_inliers = 40;
-  double min_recovery_quality = 0.25;
-  int min_recovery_cells = 5;
+  int min_relocalization_inliers = 40;
+  double min_relocalization_quality = 0.25;
+  int min_relocalization_cells = 5;
   double short_loss_s = 2.0;  // time after a loss in which the last pose is tried first
   int max_retrieved = 10;  // Keyframes retrieved by thumbnail, each then aligned to the image by a rotation.
   int max_retrieved_per_map = 4;       // contained in max_retrieved

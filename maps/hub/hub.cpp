@@ -16,7 +16,7 @@ namespace {
 using FactsJson = nlohmann::json;
 
 [[noreturn]] void RefuseRow(const std::string& what) {
-  throw Error("the hub sent " + what + "; it is damaged or no hub of Docent");
+  throw Error("the hub sent " + what + "; the database is damaged or is not a hub of Docent");
 }
 
 std::uint64_t Count(const HubRows& rows, int column, std::uint64_t most) {
@@ -142,7 +142,7 @@ Hub::Hub(const std::string& url) : connection_(url) {
     const HubRows rows = work.Query(
         "SELECT id, version, coalesce(to_jsonb(h) #>> '{restorations,-1,id}', ''), "
         "pg_has_role('docent_curator', 'USAGE') FROM docent.hub h");
-    if (rows.size() != 1) throw Error("this database holds no hub; docent hub init makes it one");
+    if (rows.size() != 1) throw Error("this database contains no hub; create one with docent hub init");
     id_ = CheckedMapId(rows.Text(0, 0));
     const std::int64_t version = rows.Integer(0, 1);
     if (version > kHubVersion)

@@ -39,7 +39,7 @@ std::string StateOf(const pqxx::sql_error& error) {
   if (state.starts_with("DC")) throw Error(line);
   if (state == "42501") throw Error("your user may not do this on the hub (" + line + ")");
   if (state == "3F000" || state == "42P01")
-    throw Error("this database holds no hub; docent hub init makes it one");
+    throw Error("this database contains no hub; create one with docent hub init");
   if (state == "53100") throw Error("the hub cannot save it because its disk is full");
   if (state.starts_with("57P")) throw HubUnreachable("the hub is shutting down");
   if (state.starts_with("23") || state.starts_with("22"))
@@ -71,7 +71,7 @@ auto Guarded(const Body& body) {
 
 [[noreturn]] void FailValue(const char* expected) {
   throw Error(std::string("the hub sent something that is not ") + expected +
-              "; it is damaged or no hub of Docent");
+              "; the database is damaged or is not a hub of Docent");
 }
 
 }  // namespace

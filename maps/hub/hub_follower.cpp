@@ -42,7 +42,7 @@ void HubFollower::Tell(const std::string& sentence) {
 
 SyncReport HubFollower::PullAndTell() {
   SyncReport report = Pull(options_);
-  if (!is_connected_) Tell("the hub is reached, and the library follows it");
+  if (!is_connected_) Tell("connected to the hub; the library follows it");
   is_connected_ = true;
   for (const std::string& line : report.lines) {
     if (!lines_.contains(line) && callbacks_.told) callbacks_.told(line);
@@ -91,7 +91,7 @@ void HubFollower::Follow(const std::stop_token& stop) {
       // Also what is no Error, as a disk that fails: a tour does not end because of its hub.
       if (stop.stop_requested()) return;
       if (is_connected_) delay = kFirstDelay;
-      Tell(std::string(error.what()) + "; everything goes on with the maps that are here");
+      Tell(std::string(error.what()) + "; the tour continues with the maps in the library");
     }
     SleepUnlessStopped(delay, stop);
     delay = std::min(2 * delay, kLongestDelay);

@@ -61,7 +61,7 @@ bool HubPusher::PushOnce() {
     // Also what is no Error, as a disk that fails: a session does not end because of its hub.
     said = {error.what()};
     if (!options_.is_stopped() && !told_.contains(error.what()))
-      Say(std::string(error.what()) + "; everything is saved here, and the hub gets it later");
+      Say(std::string(error.what()) + "; changes are saved in the library and sent to the hub later");
   }
   told_ = std::move(said);
   return is_complete;

@@ -60,7 +60,8 @@ std::size_t SendVisits(HubConnection* connection, const VisitsJson& records) {
     const std::int64_t count =
         work.Query("SELECT docent.hand_in_visits($1::jsonb)", {records.dump()}).Integer(0, 0);
     if (count < 0 || static_cast<std::size_t>(count) > records.size())
-      throw Error("the hub sent a number that is out of range; it is damaged or no hub of Docent");
+      throw Error(
+          "the hub sent a number that is out of range; the database is damaged or is not a hub of Docent");
     added = static_cast<std::size_t>(count);
   });
   return added;
@@ -105,7 +106,9 @@ std::size_t CollectVisits(const std::string& url, const std::filesystem::path& f
     for (std::size_t i = 0; i < rows.size(); ++i) {
       const std::string day = rows.Text(i, 0), line = rows.Text(i, 1);
       if (!IsDay(day) || !IsVisit(line))
-        throw Error("the hub sent a record of a visit that is not valid; it is damaged or no hub of Docent");
+        throw Error(
+            "the hub sent a record of a visit that is not valid; the database is damaged or is not a hub of "
+            "Docent");
       by_day[day].push_back(line);
     }
   });

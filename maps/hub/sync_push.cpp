@@ -154,7 +154,7 @@ void PushWithPatience(SyncSession* session, std::uint64_t key) {
       throw;
     } catch (const HubConflict&) {
       if (attempt == kPushAttempts)
-        throw Error(QuotedName(name) + " is being changed on the hub all the time; try again");
+        throw Error(QuotedName(name) + " was changed on the hub during every attempt; try again later");
     } catch (const LocalChange&) {
       if (attempt == kPushAttempts) throw;
     } catch (const Error& error) {

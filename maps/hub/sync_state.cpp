@@ -69,10 +69,12 @@ void CreateState(const Database& database, const std::string& hub_id) {
 void CheckState(const Database& database, const std::string& hub_id) {
   if (database.Number("PRAGMA application_id") != kStateId ||
       database.Number("PRAGMA user_version") != kStateVersion)
-    throw Error(database.file() + " does not say what a library and its hub have in common; move it away");
+    throw Error(database.file() +
+                " is not the record of a library's exchange with its hub; move it away and try again");
   Statement query = database.Prepare("SELECT id FROM hub");
   if (!query.Step() || !IsMapId(query.Text(0)))
-    throw Error(database.file() + " is damaged; move it away, and the library is compared with its hub anew");
+    throw Error(database.file() +
+                " is damaged; move it away, and the library is compared with its hub from the beginning");
   if (query.Text(0) != hub_id)
     throw Error(database.file() +
                 " says that the library belongs to another hub; use another library for this one");
@@ -84,7 +86,8 @@ void CheckLink(const Database& database, const MapLink& link) {
                      (link.revision == 0 || (IsHash(link.structure) && IsHash(link.scene_hash) &&
                                              ValidateMapName(link.name).empty() && ParsePolicy(link.policy)));
   if (!valid)
-    throw Error(database.file() + " is damaged; move it away, and the library is compared with its hub anew");
+    throw Error(database.file() +
+                " is damaged; move it away, and the library is compared with its hub from the beginning");
 }
 
 }  // namespace

@@ -11,7 +11,7 @@
 
 namespace docent::maps {
 
-// The result of optimizing an idle map ([PTAMM] 3.1: the map maker visits maps that no camera is in).
+// The result of optimizing an idle map (ptamm §3.1: the map maker visits maps that no camera is in).
 struct Optimization {
   enum class Outcome {
     kAdjusted,

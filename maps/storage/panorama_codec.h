@@ -7,7 +7,8 @@
 #include "maps/storage/map_codec.h"
 
 // Encodes the part `panoramas` of a map: its panorama maps and the keyframes and points that belong to them
-// ([HYBRID] 2). It is a separate part, because format 1 did not have panorama maps and few maps have many.
+// (hybrid-slam §2). It is a separate part, because format 1 did not have panorama maps and few maps have
+// many.
 namespace docent::maps {
 
 Bytes EncodePanoramas(std::uint64_t map_key, const MapParts& parts);

@@ -295,7 +295,7 @@ TEST(Edits, InvalidEditsThrowAndChangeNothing) {
   EXPECT_THAT(refusal([&] { return TargetEdit(scene, "helmet", "x", 1); }), HasSubstr("is a model"));
   EXPECT_THAT(refusal([&] { return RemoveEdit(scene, {"cat"}); }), HasSubstr("no 'cat'"));
   EXPECT_THAT(refusal([&] { return RemoveEdit(scene, {"helmet", "helmet"}); }), HasSubstr("named twice"));
-  EXPECT_THAT(refusal([&] { return RemoveEdit(scene, {}); }), HasSubstr("Nothing is named"));
+  EXPECT_THAT(refusal([&] { return RemoveEdit(scene, {}); }), HasSubstr("No object is named"));
   EXPECT_THAT(refusal([&] { return FlagEdit(scene, {"helmet"}, EntityFlag::kLocked, false); }),
               HasSubstr("'helmet' is not locked."));
   EXPECT_THAT(refusal([&] { return GroupEdit(scene, {"helmet", "sign-1"}, ""); }), HasSubstr("in no group"));

@@ -253,7 +253,7 @@ TEST(EntityKinds, ATrailGrowsAndShrinksAtItsEnd) {
   EXPECT_EQ(scene.entities[5].trail.points.back(), Eigen::Vector3d(2, 1, 2));
   history.Do(RemovePointEdit(scene, "trail-1"), &scene);
   history.Do(RemovePointEdit(scene, "trail-1"), &scene);
-  EXPECT_THAT(ErrorOf([&] { RemovePointEdit(scene, "trail-1"); }), HasSubstr("needs the points that it has"));
+  EXPECT_THAT(ErrorOf([&] { RemovePointEdit(scene, "trail-1"); }), HasSubstr("cannot have fewer points"));
   EXPECT_THAT(ErrorOf([&] {
                 AddPointEdit(scene, "plan", {0, 0, 0});
               }),

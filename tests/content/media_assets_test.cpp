@@ -143,7 +143,7 @@ TEST(SoundAssets, ReadingInPiecesGivesTheSameSamples) {
 TEST(SoundAssets, WhatIsNoWholeSoundIsRefused) {
   const auto flac = SoundBytesOf(SF_FORMAT_FLAC | SF_FORMAT_PCM_16, 1, 8000, 80'000);
   EXPECT_THAT(ErrorOf([&] { ReadSoundFormat("a.txt", std::vector<std::uint8_t>(100, 'a')); }),
-              HasSubstr("no sound in a WAV, FLAC or Ogg file"));
+              HasSubstr("is not a WAV, FLAC or Ogg sound file"));
   const std::vector<std::uint8_t> half(flac.begin(),
                                        flac.begin() + static_cast<std::ptrdiff_t>(flac.size() / 2));
   EXPECT_THAT(ErrorOf([&] { DecodeSound("half.flac", half); }),

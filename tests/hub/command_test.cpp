@@ -100,7 +100,7 @@ TEST_F(HubCommand, ErrorsAreOneSentence) {
                   "contains a password");
   ExpectErrorLine({"hub", "status", "--hub", "museum"}, 1, "begins with postgresql://");
   ExpectErrorLine({"hub", "status", "--hub", "postgresql://%2Fnowhere/x"}, 1, "cannot be reached");
-  ExpectErrorLine({"hub", "status", "--hub", server().Url("postgres")}, 1, "holds no hub");
+  ExpectErrorLine({"hub", "status", "--hub", server().Url("postgres")}, 1, "contains no hub");
   ExpectErrorLine({"hub", "revert", "Nothing", "1", "--hub", Url()}, 1, "no map named 'Nothing'");
   ExpectErrorLine({"hub", "user", "add", "anna", "--role", "king", "--hub", Url()}, 2, "king");
   ExpectErrorLine({"maps", "pull", "Nothing", "--library", Path("c.docent"), "--hub", Url()}, 1,

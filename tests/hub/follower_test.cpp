@@ -94,7 +94,7 @@ TEST_F(HubFollow, AChangeArrivesWithinTwoSeconds) {
   ShareMap();
   Told told;
   HubFollower follower(SampleSync(Url(), folder_ / "b"), told.Callbacks());
-  ASSERT_TRUE(WaitUntil([&] { return told.All().find("is reached") != std::string::npos; }, 10s))
+  ASSERT_TRUE(WaitUntil([&] { return told.All().find("connected to the hub") != std::string::npos; }, 10s))
       << told.All();
   for (int round = 0; round < 3; ++round) {
     PushText(std::to_string(round));
@@ -108,22 +108,22 @@ TEST_F(HubFollow, AHubThatIsGoneIsFoundAgain) {
   ShareMap();
   Told told;
   HubFollower follower(SampleSync(Url(), folder_ / "b"), told.Callbacks());
-  ASSERT_TRUE(WaitUntil([&] { return told.All().find("is reached") != std::string::npos; }, 10s))
+  ASSERT_TRUE(WaitUntil([&] { return told.All().find("connected to the hub") != std::string::npos; }, 10s))
       << told.All();
   server().Stop();
-  EXPECT_TRUE(WaitUntil([&] { return told.All().find("everything goes on") != std::string::npos; }, 10s))
+  EXPECT_TRUE(WaitUntil([&] { return told.All().find("the tour continues") != std::string::npos; }, 10s))
       << told.All();
-  EXPECT_EQ(TextOnB(), "Hello") << "the maps that are here are not";
+  EXPECT_EQ(TextOnB(), "Hello") << "the maps of the library are not";
   server().Start();
   PushText("after the cut");
   EXPECT_TRUE(WaitUntil([&] { return TextOnB() == "after the cut"; }, 10s)) << told.All();
 }
 
-TEST_F(HubFollow, AMapThatCouldNotBePulledIsToldOnceAndTriedAgain) {
+TEST_F(HubFollow, AMapThatCouldNotBePulledIsReportedOnceAndTriedAgain) {
   ShareMap();
   Told told;
   HubFollower follower(SampleSync(Url(AddUser("vera", "visitor")), folder_ / "b"), told.Callbacks());
-  ASSERT_TRUE(WaitUntil([&] { return told.All().find("is reached") != std::string::npos; }, 10s))
+  ASSERT_TRUE(WaitUntil([&] { return told.All().find("connected to the hub") != std::string::npos; }, 10s))
       << told.All();
   RunHubSql(Url(), "REVOKE SELECT ON docent.blobs FROM docent_visitor");
   PushText("withheld");

@@ -86,7 +86,7 @@ TEST_F(HubPush, AHubThatIsGoneGetsTheChangesWhenItIsBack) {
   server().Stop();
   ChangeText("during the cut");
   pusher.LibraryWasSaved();
-  EXPECT_TRUE(WaitUntilTold("the hub gets it later", 10s)) << Told();
+  EXPECT_TRUE(WaitUntilTold("sent to the hub later", 10s)) << Told();
   server().Start();
   EXPECT_TRUE(WaitUntilTold("as revision 2", 20s)) << Told();
   EXPECT_EQ(TextElsewhere(), "during the cut");

@@ -310,7 +310,7 @@ TEST_F(HubRoles, AHostileServerChangesNothingHere) {
 }
 
 TEST_F(HubRoles, ADatabaseWithoutAHubIsNamed) {
-  EXPECT_THAT(ErrorOf([&] { Hub hub(server().Url("postgres")); }), HasSubstr("holds no hub"));
+  EXPECT_THAT(ErrorOf([&] { Hub hub(server().Url("postgres")); }), HasSubstr("contains no hub"));
   EXPECT_EQ(InitHub(Url()).version_before, kHubVersion) << "a second init changes nothing";
   RunHubSql(Url(), "UPDATE docent.hub SET version = 99");
   EXPECT_THAT(ErrorOf([&] { Hub hub(Url()); }), HasSubstr("newer Docent"));

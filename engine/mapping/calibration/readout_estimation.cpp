@@ -161,7 +161,7 @@ std::optional<std::string> ReadoutEstimationOptions::Validate() const {
       .AtLeast(min_change_s, 0, "change of a readout time")
       .Positive(max_readout_s, "largest readout time")
       .AtLeast(min_rate, 0, "rotation rate")
-      .AtLeast(min_measurements, 1, "number of measurements that tell the readout time")
+      .AtLeast(min_measurements, 1, "number of measurements used to estimate the readout time")
       .fault();
 }
 

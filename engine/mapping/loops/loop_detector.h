@@ -16,7 +16,7 @@ namespace docent::engine {
 
 struct LoopDetectorOptions {
   LoopCandidateSearchOptions search;
-  // Active search copes with errors below this (ratio of the median depth, radians, logarithm of the scale),
+  // Guided search copes with errors below this (ratio of the median depth, radians, logarithm of the scale),
   // so they need no loop closing.
   double min_error = 0.02;
   // Drift is small relative to the path that the camera took. A candidate that implies a larger error is

@@ -15,7 +15,7 @@ namespace docent::engine {
 struct AppearanceOptions {
   int levels_around = 1;  // observations are described on so many levels above and below their own
   double inlier_px = 4;   // RANSAC, pixels of level 0
-  int min_inliers = 15;  // of descriptor matches; low, since the pose is verified by active search afterwards
+  int min_inliers = 15;  // of descriptor matches; low, since the pose is verified by guided search afterwards
   double min_inlier_ratio = 0.1;
 
   // Describes the first invalid option in one sentence, or empty.
@@ -23,7 +23,7 @@ struct AppearanceOptions {
 };
 
 // Descriptors of the finite points of a map, to estimate the pose of a keyframe that is too far off for
-// active search (hybrid-slam §5.1, §5.4). Owned by the mapper and used on its thread only. Updated keyframe
+// guided search (hybrid-slam §5.1, §5.4). Owned by the mapper and used on its thread only. Updated keyframe
 // by keyframe, and only before a query.
 class MapDescriptors {
  public:

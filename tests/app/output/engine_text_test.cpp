@@ -44,7 +44,7 @@ TEST(RigText, SaysWhetherTheRigIsRigidAndItsFigures) {
   rig.rotation_sigma_deg = 0.05;
   EXPECT_EQ(TextOf(rig), "rigid, baseline 0.25 (sigma 0.001), rotation 30 degrees (sigma 0.05)");
   rig.rigid = false;
-  EXPECT_EQ(TextOf(rig), "articulated, baseline 0.25 (sigma 0.001), rotation 30 degrees (sigma 0.05)");
+  EXPECT_EQ(TextOf(rig), "not rigid, baseline 0.25 (sigma 0.001), rotation 30 degrees (sigma 0.05)");
 }
 
 TEST(MapperEventText, SaysWhatWasDoneAndWhere) {
@@ -88,7 +88,8 @@ TEST(MapperEventText, GivesTheFiguresOfAnAdjustmentAndOfALoop) {
   loop.fused = 99;
   EXPECT_EQ(InHall(MapperEvent::LoopClosed{loop}),
             "loop: closed in Hall: drift of 1.2 % of the path, 2.00 degrees, -3.0 % in scale; keyframe 40 "
-            "matches keyframe 2: 70 of 200 points, 33 duplicates, 51 in reverse, 99 points fused");
+            "matches keyframe 2: 70 of 200 map points found, 33 pairs of duplicate points, 51 inliers in the "
+            "reverse check; 99 pairs fused in total");
 }
 
 TEST(MapperEventText, WarnsAboutACalibrationInWholeSentences) {
@@ -99,7 +100,7 @@ TEST(MapperEventText, WarnsAboutACalibrationInWholeSentences) {
 
 TEST(JoinRefusalText, SaysWhyTwoMapsWereNotJoined) {
   EXPECT_EQ(TextOf(JoinRefusal::kNone, {}), "");
-  EXPECT_EQ(TextOf(JoinRefusal::kTooMuchDrift, {}), "one map would have to be bent too far to fit the other");
+  EXPECT_EQ(TextOf(JoinRefusal::kTooMuchDrift, {}), "one of the maps has drifted too far to fit the other");
   MapOverlap overlap;
   overlap.outcome = MapOverlap::Outcome::kTooFewConsecutive;
   overlap.consecutive = 2;

@@ -103,7 +103,7 @@ const SourceRun& JoinedWalk() {
 
 TEST(LiveJoining, JoinsTheTwoMapsBetweenWhichTheCameraWasLost) {
   const SourceRun& outcome = JoinedWalk();
-  EXPECT_THAT(outcome.map_events, ::testing::Contains(HasSubstr("began Hall 2")));
+  EXPECT_THAT(outcome.map_events, ::testing::Contains(HasSubstr("started Hall 2")));
   EXPECT_THAT(outcome.map_events, ::testing::Contains(HasSubstr("maps Hall and Hall 2 were joined")));
   ASSERT_EQ(outcome.maps.size(), 1u) << ::testing::PrintToString(outcome.map_events);
   EXPECT_EQ(outcome.maps[0].name, "Hall");
@@ -199,7 +199,7 @@ TEST(LiveJoining, DoesNotJoinMapsOfLookAlikePlaces) {
   order.insert(order.end(), second.begin(), second.end());
   order.insert(order.end(), first.begin(), first.end());
   const SourceRun outcome = RunInOrder(simulation, order, Pace::kLockstep, nullptr);
-  EXPECT_THAT(outcome.map_events, ::testing::Contains(HasSubstr("began Hall 2")));
+  EXPECT_THAT(outcome.map_events, ::testing::Contains(HasSubstr("started Hall 2")));
   EXPECT_THAT(outcome.map_events, ::testing::Contains(HasSubstr("were not joined")));
   EXPECT_EQ(outcome.maps.size(), 2u) << ::testing::PrintToString(outcome.map_events);
   EXPECT_EQ(outcome.frames.back().map_key, outcome.maps[0].key);

@@ -68,7 +68,7 @@ TEST(RouteState, SaysBeforeTheFirstStopHowLongTheTourTakes) {
   RouteState state(route);
   EXPECT_EQ(RouteLine(state), "1 stop, about 20 minutes. First: A");
   Stay(1, &state);
-  EXPECT_EQ(RouteLine(state), "The tour ends here. You saw the only stop.");
+  EXPECT_EQ(RouteLine(state), "The tour ends here. You saw its only stop.");
 }
 
 TEST(RouteState, ArrivesOnceAtEachStop) {

@@ -41,7 +41,7 @@ TEST(VisitState, LetsTheWelcomeBeReadBeforeItSaysThatNothingIsRecognized) {
   EXPECT_FALSE(visit.Welcomes(8)) << "who was somewhere knows what to do";
 }
 
-TEST(VisitState, ShowsTheEntrancesToWhoIsNotRecognizedSoon) {
+TEST(VisitState, ShowsTheEntrancesToAVisitorWhoIsNotRecognizedSoon) {
   const VisitTimes times;
   VisitState visit({"Lions", "Masks"});
   visit.Update(0, "", "");

@@ -121,7 +121,7 @@ TEST(Wearable, BuildsOneMapWithBothCamerasAndEachTracksWhatTheOtherMapped) {
       most = std::max(most, others);
     }
     RecordProperty("points_of_the_other_" + std::to_string(camera), most);
-    EXPECT_GE(most, 2 * engine::TrackerOptions().min_recovery_inliers) << "camera " << camera;
+    EXPECT_GE(most, 2 * engine::TrackerOptions().min_relocalization_inliers) << "camera " << camera;
   }
   EXPECT_FALSE(walk.rig && walk.rig->rigid)
       << "these cameras move relative to each other: " << TextOf(*walk.rig);

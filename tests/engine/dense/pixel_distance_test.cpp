@@ -38,7 +38,7 @@ class PixelDistance : public ::testing::Test {
   cv::Mat image_ = World().Render(*Camera(), pose_, 2, 7);
 };
 
-TEST_F(PixelDistance, IsRightNearlyWhereverItIsTold) {
+TEST_F(PixelDistance, IsCorrectAtNearlyAllPixelsWhereItIsMeasured) {
   Random random(5);
   int pixels = 0, told = 0, right = 0;
   for (int i = 0; i < 300; ++i) {
@@ -71,7 +71,7 @@ TEST_F(PixelDistance, DoesNotDependOnExposureOrColour) {
   EXPECT_NEAR(*after, *before, 0.01 * *before);
 }
 
-TEST_F(PixelDistance, IsNotToldWithoutTextureImagesOrMap) {
+TEST_F(PixelDistance, IsNotMeasuredWithoutTextureImagesOrMap) {
   const Eigen::Vector2d middle(Camera()->width_px() * 0.5, Camera()->height_px() * 0.5);
   EXPECT_FALSE(Measure({2, 2}).has_value()) << "the patch leaves the image";
   EXPECT_FALSE(Measure({-50, 1e6}).has_value());

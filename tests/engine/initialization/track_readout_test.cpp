@@ -122,7 +122,7 @@ TEST(TrackReadout, IsUncertainWhileTheMotionIsUniform) {
   EXPECT_GT(uniform->sigma_s, 4 * swaying->sigma_s);
 }
 
-TEST(TrackReadout, IsNotImpressedByWrongCorners) {
+TEST(TrackReadout, IsRobustToWrongCorners) {
   for (const double drift_px : {0.05, 0.2, 1.0}) {
     for (std::uint64_t seed = 1; seed <= 4; ++seed) {
       RolledScene scene;
@@ -152,7 +152,7 @@ TEST(TrackReadout, IsPassedOnOnlyIfItIsSignificant) {
   EXPECT_FALSE(SignificantReadout({}, estimate)) << "the errors of a calibration look alike";
 }
 
-TEST(TrackReadout, IsMissingWhereTheImagesDoNotTellIt) {
+TEST(TrackReadout, IsNotEstimatedWhereTheImagesDoNotDetermineIt) {
   RolledScene scene;
   scene.images = TrackReadoutOptions().min_images - 1;
   EXPECT_FALSE(EstimateScene(scene)) << "too few images";

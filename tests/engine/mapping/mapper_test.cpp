@@ -213,7 +213,7 @@ TEST_F(MapperTest, LearnsTheReadoutTimeFromCornersAfterItsStart) {
   EXPECT_EQ(Validate(*mapper.Snapshot()), "");
 }
 
-TEST_F(MapperTest, CorrectsAReadoutTimeThatNoCornersHaveTold) {
+TEST_F(MapperTest, CorrectsAReadoutTimeThatWasNotEstimatedFromCorners) {
   Mapper mapper({});
   mapper.Start(TurningPair(*pair_, 0.035));
   WorkUntilIdle(&mapper);

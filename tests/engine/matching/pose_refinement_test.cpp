@@ -455,7 +455,7 @@ TEST(PoseRefinement, UsesThePredictedCenterBeforeADistantWall) {
   }
 }
 
-TEST(PoseRefinement, IgnoresThePredictedCenterWherePointsTellThePosition) {
+TEST(PoseRefinement, IgnoresThePredictedCenterWherePointsDetermineThePosition) {
   Random random(41);
   std::vector<PoseMeasurement> spread;
   AddMeasurements(300, 0.5, false, &random, &spread);

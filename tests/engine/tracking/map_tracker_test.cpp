@@ -233,7 +233,7 @@ TEST_F(TrackingInAMap, RecoversFromABadPrediction) {
     for (const Rigid3& offset : offsets) {
       MapTracker tracker({}, camera_);
       const MapTrackResult result =
-          tracker.Track(*map_, *features, offset * view, Effort::kRecovery, &random);
+          tracker.Track(*map_, *features, offset * view, Effort::kRelocalization, &random);
       ExpectAt(result, view);
       EXPECT_TRUE(IsAcceptable(result));
     }
@@ -245,7 +245,7 @@ TEST_F(TrackingInAMap, RejectsImagesOfAnotherWorld) {
   Random random(4);
   for (const Rigid3& view : ViewsOfTheRoom()) {
     const auto features = Show(other, view);
-    for (const Effort effort : {Effort::kStandard, Effort::kWide, Effort::kRecovery}) {
+    for (const Effort effort : {Effort::kStandard, Effort::kWide, Effort::kRelocalization}) {
       MapTracker tracker({}, camera_);
       const MapTrackResult result = tracker.Track(*map_, *features, view, effort, &random);
       EXPECT_FALSE(IsAcceptable(result)) << "effort " << static_cast<int>(effort) << ": " << result.inliers
@@ -258,7 +258,7 @@ TEST_F(TrackingInAMap, DoesNotConvergeOnABlankImageOrInAnEmptyMap) {
   Random random(5);
   const auto blank = MakeFeatures(cv::Mat(300, 400, CV_8UC1, cv::Scalar(90)));
   const auto features = Show(*world_, ViewsOfTheRoom()[0]);
-  for (const Effort effort : {Effort::kStandard, Effort::kWide, Effort::kRecovery}) {
+  for (const Effort effort : {Effort::kStandard, Effort::kWide, Effort::kRelocalization}) {
     MapTracker tracker({}, camera_);
     EXPECT_FALSE(tracker.Track(*map_, *blank, ViewsOfTheRoom()[0], effort, &random).converged);
     EXPECT_FALSE(tracker.Track(MapSnapshot(), *features, ViewsOfTheRoom()[0], effort, &random).converged);

@@ -69,7 +69,8 @@ TEST_F(KnownRoom, IsFoundAgainFromThePoseBeforeTheLoss) {
   tracker_.Lose(image.time);
   image = ImageAt(Pose(6), 6);
   const Rigid3 guess = tracker_.PredictAfterLoss(image);
-  const auto result = tracker_.TryFrom(*TheMap(), image, guess, MapTracker::Effort::kRecovery, &random_);
+  const auto result =
+      tracker_.TryFrom(*TheMap(), image, guess, MapTracker::Effort::kRelocalization, &random_);
   EXPECT_LT((result.camera_from_map.OriginInSource() - Pose(6).OriginInSource()).norm(), 0.01);
 }
 

@@ -64,7 +64,7 @@ TEST(PositionFilter, IsUncertainWhileTheVelocityIsUnknown) {
   EXPECT_GT(filter.Predict(ImageTime(3), kDepth)->sigma, 0.15) << "a person takes a step of 20 cm in 0.1 s";
 }
 
-TEST(PositionFilter, HardlyFollowsPositionsThatPointsTellPoorly) {
+TEST(PositionFilter, HardlyFollowsPositionsThatPointsDeterminePoorly) {
   PositionFilter filter = Walked(60, 0.005);
   const Eigen::Vector3d jump(0.4, 0, 0);
   for (int i = 60; i < 66; ++i) filter.Add(ImageTime(i), CenterAt(i) + jump, 0.4, kDepth, false);

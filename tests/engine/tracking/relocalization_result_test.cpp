@@ -102,7 +102,7 @@ TEST(RelocalizationResult, ReportsTooFewPointsInAnotherPlace) {
   for (const TrackedFrame& frame : Visit(maps, 6, RenderedWorld::Room(7177))) {
     EXPECT_EQ(frame.state, TrackingState::kLost);
     EXPECT_EQ(frame.relocalization.rejection, RejectionReason::kFewPoints);
-    EXPECT_LT(frame.relocalization.inliers, TrackerOptions().min_recovery_inliers);
+    EXPECT_LT(frame.relocalization.inliers, TrackerOptions().min_relocalization_inliers);
   }
 }
 
@@ -113,7 +113,7 @@ TEST(RelocalizationResult, ReportsPointsInOneCornerOnly) {
   for (const TrackedFrame& frame : Visit(maps, 6)) {
     EXPECT_EQ(frame.state, TrackingState::kLost);
     EXPECT_EQ(frame.relocalization.rejection, RejectionReason::kClustered);
-    EXPECT_GE(frame.relocalization.inliers, TrackerOptions().min_recovery_inliers);
+    EXPECT_GE(frame.relocalization.inliers, TrackerOptions().min_relocalization_inliers);
   }
 }
 

@@ -118,7 +118,7 @@ TEST(LoopDetector, LeavesOutAFirstCandidateThatTheNewestContradicts) {
   EXPECT_EQ(series, (std::vector<KeyFrameId>{15, 16, 15}));
 }
 
-TEST(LoopDetector, IgnoresErrorsThatActiveSearchCopesWith) {
+TEST(LoopDetector, IgnoresErrorsThatGuidedSearchCopesWith) {
   Map map = ThereAndBack({});
   EXPECT_EQ(LoopsOf(kInOrder, &map), Loops{});
   LoopDetectorOptions options;

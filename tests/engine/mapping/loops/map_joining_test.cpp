@@ -275,7 +275,7 @@ TEST(MapJoining, GivesAllImagesOfALensOneReadoutTime) {
 }
 
 // Corners tell a mapper the readout time once; later ones are not asked.
-TEST(MapJoining, KeepsWhatCornersToldOfTheReadoutTime) {
+TEST(MapJoining, KeepsTheReadoutTimeEstimatedFromCorners) {
   const auto image = TurningImage(0.2, 0);
   const auto a = WithImages(*OverlappingPair().a, image), b = WithImages(*OverlappingPair().b, image);
   const KeyFrame& last = a->keyframes.back();
