@@ -10,6 +10,7 @@
 #include "maps/library/verify.h"
 #include "maps/storage/block_checks.h"
 #include "maps/storage/history_rows.h"
+#include "maps/storage/library_identity.h"
 #include "maps/storage/rows.h"
 #include "maps/storage/tour_rows.h"
 
@@ -113,6 +114,22 @@ const Bytes& ItemOf(const LocalMap& map, std::string_view item) {
   return found->second;
 }
 
+// The identity of a library, which gets one if it has none.
+std::string IdentityOf(const Database& database) {
+  {
+    const Transaction transaction(database, Transaction::Kind::kRead);
+    if (const std::string identity = ReadLibraryIdentity(database); !identity.empty()) return identity;
+  }
+  Transaction transaction(database, Transaction::Kind::kWrite);
+  // Another program may have given it one meanwhile.
+  std::string identity = ReadLibraryIdentity(database);
+  if (!identity.empty()) return identity;
+  identity = NewMapId();
+  WriteLibraryIdentity(database, identity);
+  transaction.Commit();
+  return identity;
+}
+
 std::string Retargeted(const SceneTools& scenes, const std::string& text, const Retarget& retarget) {
   if (text.empty() || !scenes.retarget) return text;
   return scenes.retarget(text, retarget).value_or(text);
@@ -126,6 +143,7 @@ LocalLibrary::LocalLibrary(const std::filesystem::path& path, CreateIfMissing cr
       library_(Library::Open(path, Access::kReadWrite, create, OptionsOf(scenes_))),
       database_(Database::OpenReadWrite(path, false)) {
   database_.StartWriting();
+  identity_ = IdentityOf(database_);
 }
 
 std::string LocalLibrary::StampOf(std::uint64_t key) const {

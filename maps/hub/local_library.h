@@ -30,6 +30,8 @@ class LocalLibrary {
   // The same library with its own verbs.
   Library& library() { return library_; }
   const Library& library() const { return library_; }
+  // Tells this library from every other one (library_identity.h).
+  const std::string& identity() const { return identity_; }
 
   // Keeps authoring sessions away while maps that they may have in memory are replaced. Throws
   // LibraryInSession if there is one.
@@ -59,6 +61,7 @@ class LocalLibrary {
   SceneTools scenes_;
   Library library_;  // Opened first: it upgrades older formats.
   Database database_;
+  std::string identity_;
 };
 
 }  // namespace docent::maps

@@ -57,18 +57,21 @@ void SyncSession::CheckLinksAreOfThisLibrary() {
   for (const MapInfo& info : local_.library().List())
     created[info.key] = info.created.time_since_epoch().count();
   const std::uint64_t next_key = local_.NextKey();
-  const bool is_other = std::any_of(links_.begin(), links_.end(), [&](const MapLink& link) {
+  const std::string library = state_.LibraryIdentity();
+  const bool is_of_other_map = std::any_of(links_.begin(), links_.end(), [&](const MapLink& link) {
     const auto found = created.find(link.key);
     return link.key >= next_key ||
            (found != created.end() && link.created != 0 && link.created != found->second);
   });
-  if (is_other) {
-    state_.RemoveAllLinks();
+  if (is_of_other_map || (!library.empty() && library != local_.identity())) {
+    state_.StartAnew(local_.identity());
+    if (links_.empty()) return;
     links_.clear();
     Say(QuotedName(SyncStatePath(options_.library).string()) +
         " was written for another library of this name, so that library and hub are compared anew");
     return;
   }
+  if (library.empty()) state_.SetLibraryIdentity(local_.identity());
   for (MapLink& link : links_) {
     // Older programs did not store it.
     const auto found = created.find(link.key);

@@ -32,10 +32,11 @@ constexpr std::array<const char*, 4> kStateTables = {
 struct LaterColumn {
   const char *table, *name, *type;
 };
-constexpr std::array<LaterColumn, 3> kLaterColumns = {{
+constexpr std::array<LaterColumn, 4> kLaterColumns = {{
     {"links", "created", "INTEGER NOT NULL DEFAULT 0"},
     {"links", "restoration", "TEXT NOT NULL DEFAULT ''"},
     {"tours", "restoration", "TEXT NOT NULL DEFAULT ''"},
+    {"hub", "library", "TEXT NOT NULL DEFAULT ''"},
 }};
 
 bool HasColumn(const Database& database, const LaterColumn& column) {
@@ -160,15 +161,25 @@ void SyncState::Put(const TourLink& tour) {
       .Run();
 }
 
-void SyncState::RemoveAllLinks() {
+void SyncState::RemoveTour(const std::string& name) {
+  database_.Prepare("DELETE FROM tours WHERE name = ?").Bind(1, name).Run();
+}
+
+std::string SyncState::LibraryIdentity() const {
+  Statement query = database_.Prepare("SELECT library FROM hub");
+  return query.Step() ? query.Text(0) : "";
+}
+
+void SyncState::SetLibraryIdentity(const std::string& identity) {
+  database_.Prepare("UPDATE hub SET library = ?").Bind(1, identity).Run();
+}
+
+void SyncState::StartAnew(const std::string& identity) {
   Transaction transaction(database_, Transaction::Kind::kWrite);
   database_.Execute("DELETE FROM links");
   database_.Execute("DELETE FROM tours");
+  SetLibraryIdentity(identity);
   transaction.Commit();
-}
-
-void SyncState::RemoveTour(const std::string& name) {
-  database_.Prepare("DELETE FROM tours WHERE name = ?").Bind(1, name).Run();
 }
 
 std::optional<Bytes> SyncState::Received(const std::string& hash) const {

@@ -12,9 +12,10 @@
 
 // What a device knows of its hub: the file NAME.docent.hub beside the library, an SQLite database. It is
 // written after the library, so that a crash between the two leaves an older state here; then the next
-// synchronization finds that library and hub agree already. Links say which map they were made for, because
-// another library may later have this name, and under which restoration of the hub, because the numbers of
-// revisions mean other states after one. Not thread-safe. Errors throw docent::Error.
+// synchronization finds that library and hub agree already. It says which
+// library the links were made for, because another one may later have this name, and under which restoration
+// of the hub, because the numbers of revisions mean other states after one. Not thread-safe. Errors throw
+// docent::Error.
 namespace docent::maps {
 
 // A map of the library on the hub, and what it was when both last agreed.
@@ -55,8 +56,12 @@ class SyncState {
   std::vector<TourLink> Tours() const;  // By name.
   void Put(const TourLink& tour);
   void RemoveTour(const std::string& name);
-  // Removes all links of maps and tours.
-  void RemoveAllLinks();
+
+  // LocalLibrary::identity of the library for which the links were made; empty if an older program made them.
+  std::string LibraryIdentity() const;
+  void SetLibraryIdentity(const std::string& identity);
+  // Removes all links of maps and tours, and sets the identity of the library for the next ones.
+  void StartAnew(const std::string& identity);
 
   // Bytes that were received for a map that is not complete yet, so that an interrupted transfer goes on.
   std::optional<Bytes> Received(const std::string& hash) const;

@@ -6,6 +6,7 @@
 #include "engine/base/error.h"
 #include "maps/storage/block_checks.h"
 #include "maps/storage/lens_rows.h"
+#include "maps/storage/library_identity.h"
 #include "maps/storage/rows.h"
 #include "maps/storage/schema.h"
 
@@ -169,7 +170,8 @@ std::vector<StoredLens> SalvagedRows::Lenses(std::vector<std::string>* problems)
   for (const auto& [camera, places] : lenses_) {
     try {
       UseFirst(Usable(&places), "it cannot be read", [&, &name = camera](const SalvagedRow& row, bool) {
-        lenses.push_back(CheckedLens(name, row.values[1].bytes, row.values[2].integer));
+        const StoredLens lens = CheckedLens(name, row.values[1].bytes, row.values[2].integer);
+        if (!IsLibraryIdentity(lens)) lenses.push_back(lens);
       });
     } catch (const Error& error) {
       // Such a row may also be one of another program; only what a camera can be called is worth a sentence.

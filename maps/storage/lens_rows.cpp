@@ -8,6 +8,7 @@
 #include "engine/base/error.h"
 #include "maps/storage/byte_stream.h"
 #include "maps/storage/checksum.h"
+#include "maps/storage/library_identity.h"
 #include "maps/storage/schema.h"
 
 namespace docent::maps {
@@ -89,7 +90,8 @@ std::vector<StoredLens> ReadLenses(const Database& database) {
   while (query.Step()) {
     const std::string camera = query.Text(0);
     try {
-      lenses.push_back(CheckedLens(camera, query.Blob(1), query.Integer(2)));
+      const StoredLens lens = CheckedLens(camera, query.Blob(1), query.Integer(2));
+      if (!IsLibraryIdentity(lens)) lenses.push_back(lens);
     } catch (const Error& error) {
       const std::string what = error.what();
       if (what.starts_with(database.file())) throw;

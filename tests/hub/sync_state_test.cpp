@@ -167,6 +167,32 @@ TEST_F(HubState, AFileBesideANewLibraryIsNotUsed) {
   EXPECT_EQ(NamesIn(OpenSampleLibrary(folder_ / "a")), "Desk,Hall,new1 0,new2 0,new2 1");
 }
 
+TEST_F(HubState, AFileBesideANewLibraryThatHasOnlyReservedKeysRemovesNothing) {
+  {
+    Library a = OpenSampleLibrary(folder_ / "a");
+    AddSampleMap(&a, "Desk", 7);
+    AddSampleMap(&a, "Hall", 8);
+  }
+  Push(SampleSync(Url(), folder_ / "a"));
+  // As an author's session does that ends without a map.
+  for (const char* name : {"new", "pulled"}) {
+    std::filesystem::copy_file(SyncStatePath(folder_ / "a"), SyncStatePath(folder_ / name));
+    OpenSampleLibrary(folder_ / name).ReserveKeys(64);
+  }
+  SyncOptions options = SampleSync(Url(), folder_ / "new");
+  options.remove = true;
+  EXPECT_THAT(LinesOf(Push(options)), HasSubstr("was written for another library"));
+  EXPECT_THAT(LinesOf(Pull(SampleSync(Url(), folder_ / "pulled"))), HasSubstr("'Hall' was added"));
+  EXPECT_EQ(NamesIn(OpenSampleLibrary(folder_ / "pulled")), "Desk,Hall");
+  // What was removed from the library with the file is still removed from the hub.
+  {
+    Library library = OpenSampleLibrary(folder_ / "pulled");
+    for (const MapInfo& info : library.List()) library.Remove(info.key);
+  }
+  options.library = folder_ / "pulled";
+  EXPECT_THAT(LinesOf(Push(options)), HasSubstr("'Desk' was removed from the hub"));
+}
+
 TEST_F(HubState, AFileOfAnOlderProgramIsUsed) {
   {
     Library a = OpenSampleLibrary(folder_ / "a");

@@ -1,0 +1,43 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "maps/storage/library_identity.h"
+
+#include <string_view>
+
+#include "engine/base/error.h"
+#include "maps/storage/byte_stream.h"
+
+namespace docent::maps {
+
+namespace {
+
+constexpr std::string_view kIdentityPrefix = "library ";
+
+}  // namespace
+
+std::string ReadLibraryIdentity(const Database& database) {
+  Statement query = database.Prepare(
+      "SELECT camera, data, checksum FROM lenses WHERE camera GLOB 'library *' ORDER BY camera");
+  while (query.Step()) {
+    const std::string camera = query.Text(0);
+    const Bytes data(query.Blob(1).begin(), query.Blob(1).end());
+    const std::int64_t checksum = query.Integer(2);
+    try {
+      if (IsLibraryIdentity(CheckedLens(camera, data, checksum)))
+        return camera.substr(kIdentityPrefix.size());
+    } catch (const Error&) {
+      continue;  // ReadLenses reports it.
+    }
+  }
+  return "";
+}
+
+void WriteLibraryIdentity(const Database& database, const std::string& identity) {
+  WriteLens(database, {std::string(kIdentityPrefix) + identity, engine::CameraModel(), 1, true});
+}
+
+bool IsLibraryIdentity(const StoredLens& lens) {
+  return lens.camera.starts_with(kIdentityPrefix) && lens.model.width_px() == 1 &&
+         lens.model.height_px() == 1;
+}
+
+}  // namespace docent::maps
