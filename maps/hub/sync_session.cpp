@@ -53,32 +53,27 @@ SyncSession::SyncSession(const SyncOptions& options, CreateIfMissing create)
 }
 
 void SyncSession::CheckLinksAreOfThisLibrary() {
-  std::map<std::uint64_t, std::int64_t> created;
-  for (const MapInfo& info : local_.library().List())
-    created[info.key] = info.created.time_since_epoch().count();
-  const std::uint64_t next_key = local_.NextKey();
   const std::string library = state_.LibraryIdentity();
-  const bool is_of_other_map = std::any_of(links_.begin(), links_.end(), [&](const MapLink& link) {
-    const auto found = created.find(link.key);
-    return link.key >= next_key ||
-           (found != created.end() && link.created != 0 && link.created != found->second);
-  });
-  if (is_of_other_map || (!library.empty() && library != local_.identity())) {
-    state_.StartAnew(local_.identity());
-    if (links_.empty()) return;
-    links_.clear();
-    Say(QuotedName(SyncStatePath(options_.library).string()) +
-        " was written for another library of this name, so that library and hub are compared anew");
+  const std::uint64_t next_key = local_.NextKey();
+  const bool has_unknown_key =
+      std::any_of(links_.begin(), links_.end(), [&](const MapLink& link) { return link.key >= next_key; });
+  if (!has_unknown_key && (library.empty() ? AreMapsAsOldAsLinksSay() : library == local_.identity())) {
+    if (library.empty()) state_.SetLibraryIdentity(local_.identity());
     return;
   }
-  if (library.empty()) state_.SetLibraryIdentity(local_.identity());
-  for (MapLink& link : links_) {
-    // Older programs did not store it.
-    const auto found = created.find(link.key);
-    if (link.revision == 0 || link.created != 0 || found == created.end()) continue;
-    link.created = found->second;
-    state_.Put(link);
-  }
+  state_.StartAnew(local_.identity());
+  if (links_.empty()) return;
+  links_.clear();
+  Say(QuotedName(SyncStatePath(options_.library).string()) +
+      " was written for another library of this name, so that library and hub are compared anew");
+}
+
+bool SyncSession::AreMapsAsOldAsLinksSay() const {
+  const std::vector<MapInfo> maps = local_.library().List();
+  return std::all_of(maps.begin(), maps.end(), [&](const MapInfo& info) {
+    const MapLink* link = LinkOf(info.key);
+    return link == nullptr || link->created == 0 || link->created == info.created.time_since_epoch().count();
+  });
 }
 
 void SyncSession::ReadHeads() {

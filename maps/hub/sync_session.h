@@ -78,6 +78,10 @@ class SyncSession {
  private:
   // Removes the links if they were made for another library that had this name.
   void CheckLinksAreOfThisLibrary();
+  // Whether the maps here were created when the links say, as far as these say it. Only where the links do
+  // not name their library: a map that is taken from the hub takes the time of the device that created it
+  // there, and its link follows later.
+  bool AreMapsAsOldAsLinksSay() const;
 
   SyncOptions options_;
   Hub hub_;

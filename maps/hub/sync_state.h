@@ -30,7 +30,7 @@ struct MapLink {
   std::string name;           // On the hub.
   std::string local_name;     // In the library, where another map may have had the name.
   std::string policy;         // As in policy.h.
-  std::int64_t created = 0;   // MapInfo::created of the map with this key, in ns; 0 if that is not known.
+  std::int64_t created = 0;   // MapInfo::created, ns; 0 if not known. Counts only without LibraryIdentity.
   std::string restoration;    // Hub::restoration at that time.
 };
 

@@ -143,11 +143,15 @@ TEST_F(HubState, AFileBesideANewLibraryIsNotUsed) {
     AddSampleMap(&a, "Hall", 8);
   }
   Push(SampleSync(Url(), folder_ / "a"));
-  // Each new library has given out fewer keys than the old one, or the same keys to other maps.
-  for (const std::uint64_t maps : {0u, 1u, 2u}) {
+  // Each new library has given out fewer keys than the old one, or the same keys to other maps; a file of an
+  // older program does not name its library.
+  std::filesystem::copy_file(SyncStatePath(folder_ / "a"), folder_ / "older");
+  maps::Database::OpenReadWrite(folder_ / "older", false).Execute("UPDATE hub SET library = ''");
+  for (const std::uint64_t maps : {0u, 1u, 2u, 3u}) {
     SCOPED_TRACE(maps);
     const std::string name = "new" + std::to_string(maps);
-    std::filesystem::copy_file(SyncStatePath(folder_ / "a"), SyncStatePath(folder_ / name));
+    std::filesystem::copy_file(maps == 0 || maps == 3 ? SyncStatePath(folder_ / "a") : folder_ / "older",
+                               SyncStatePath(folder_ / name));
     {
       Library library = OpenSampleLibrary(folder_ / name);
       for (std::uint64_t i = 0; i < maps; ++i)
@@ -161,10 +165,11 @@ TEST_F(HubState, AFileBesideANewLibraryIsNotUsed) {
     EXPECT_THAT(Push(options).lines, IsEmpty()) << "it is told once";
   }
   Pull(SampleSync(Url(), folder_ / "new2"));
-  EXPECT_EQ(NamesIn(OpenSampleLibrary(folder_ / "new2")), "Desk,Hall,new1 0,new2 0,new2 1");
+  const std::string all = "Desk,Hall,new1 0,new2 0,new2 1,new3 0,new3 1,new3 2";
+  EXPECT_EQ(NamesIn(OpenSampleLibrary(folder_ / "new2")), all);
   EXPECT_EQ(DifferenceOf("Desk", folder_ / "a", folder_ / "new2"), "");
   EXPECT_EQ(Pull(SampleSync(Url(), folder_ / "a")).problems, 0);
-  EXPECT_EQ(NamesIn(OpenSampleLibrary(folder_ / "a")), "Desk,Hall,new1 0,new2 0,new2 1");
+  EXPECT_EQ(NamesIn(OpenSampleLibrary(folder_ / "a")), all);
 }
 
 TEST_F(HubState, AFileBesideANewLibraryThatHasOnlyReservedKeysRemovesNothing) {
@@ -193,6 +198,23 @@ TEST_F(HubState, AFileBesideANewLibraryThatHasOnlyReservedKeysRemovesNothing) {
   EXPECT_THAT(LinesOf(Push(options)), HasSubstr("'Desk' was removed from the hub"));
 }
 
+TEST_F(HubState, AMapThatTwoDevicesImportedKeepsItsLinkWhenAPullIsKilled) {
+  for (const char* device : {"a", "b"}) {
+    Library library = OpenSampleLibrary(folder_ / device);
+    AddSampleMap(&library, "Desk", 7);
+  }
+  Push(SampleSync(Url(), folder_ / "a"));
+  ASSERT_THAT(LinesOf(Push(SampleSync(Url(), folder_ / "b"))), HasSubstr("the same map as on the hub"));
+  AddSign("a", "sign-2", "theirs");
+  Push(SampleSync(Url(), folder_ / "a"));
+  // After the kill, the library has the map and the time at which `a` created it, and the file the old link.
+  const std::filesystem::path state = SyncStatePath(folder_ / "b"), before = folder_ / "before";
+  std::filesystem::copy_file(state, before);
+  ASSERT_THAT(LinesOf(Pull(SampleSync(Url(), folder_ / "b"))), HasSubstr("was updated to revision 2"));
+  std::filesystem::copy_file(before, state, std::filesystem::copy_options::overwrite_existing);
+  EXPECT_THAT(Pull(SampleSync(Url(), folder_ / "b")).lines, IsEmpty());
+}
+
 TEST_F(HubState, AFileOfAnOlderProgramIsUsed) {
   {
     Library a = OpenSampleLibrary(folder_ / "a");
@@ -204,11 +226,11 @@ TEST_F(HubState, AFileOfAnOlderProgramIsUsed) {
     const maps::Database database = maps::Database::OpenReadWrite(state, false);
     for (const char* sql :
          {"ALTER TABLE links DROP COLUMN created", "ALTER TABLE links DROP COLUMN restoration",
-          "ALTER TABLE tours DROP COLUMN restoration"})
+          "ALTER TABLE tours DROP COLUMN restoration", "ALTER TABLE hub DROP COLUMN library"})
       database.Execute(sql);
   }
   EXPECT_THAT(Push(SampleSync(Url(), folder_ / "a")).lines, IsEmpty());
-  EXPECT_NE(maps::Database::OpenReadWrite(state, false).Number("SELECT created FROM links"), 0)
+  EXPECT_EQ(maps::Database::OpenReadWrite(state, false).Number("SELECT length(library) FROM hub"), 36)
       << "it knows its library from now on";
 }
 
