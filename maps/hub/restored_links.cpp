@@ -40,7 +40,7 @@ enum class Holds { kAll, kOlderRevision, kRevisionOnly, kNothing };
 Holds WhatHolds(std::int64_t revision, std::int64_t kept, std::int64_t on_hub, bool may_save) {
   if (revision <= std::min(kept, on_hub)) return Holds::kAll;
   if (on_hub <= kept) return Holds::kOlderRevision;
-  return may_save || kept == 0 ? Holds::kNothing : Holds::kRevisionOnly;
+  return may_save ? Holds::kNothing : Holds::kRevisionOnly;
 }
 
 // No map has this state, so that it counts as changed.
@@ -70,7 +70,8 @@ std::vector<std::uint64_t> ForgetLostRevisions(const std::vector<HubRestoration>
         newer_here.push_back(link.key);
         break;
       case Holds::kRevisionOnly:
-        link.revision = kept;
+        // If the backup lacked the map, any number that the hub's revision has not makes it newer than here.
+        link.revision = kept > 0 ? kept : head->revision + 1;
         break;
       case Holds::kNothing:
         link.revision = 0;

@@ -132,6 +132,39 @@ TEST_F(HubRestore, AVisitorsDeviceFollowsAgainOnceTheMapIsSaved) {
   EXPECT_EQ(DifferenceOf("Desk", folder_ / "a", folder_ / "b"), "");
 }
 
+TEST_F(HubRestore, AVisitorsDeviceTakesAMapThatTheBackupLackedOnceItIsSaved) {
+  ShareMapAndBackUp();
+  const std::string vera = AddUser("vera", "visitor");
+  {
+    Library a = Open("a");
+    const std::uint64_t key = AddSampleMap(&a, "Hall", 8);
+    a.ChangeTours([&](std::vector<Tour>* tours) { tours->push_back({"Long", {key}, "", 90}); });
+  }
+  PushFrom("a");
+  AddSampleSignpost(folder_ / "a", "Hall", "sign-2", "X");
+  PushFrom("a");  // Revision 2, which the visitor's device gets.
+  PullTo("b", vera);
+  Restore();
+  PullTo("b", vera);
+  EXPECT_EQ(NamesIn(Open("b")), "Desk,Hall") << "nobody has saved it yet";
+  {
+    Library a = Open("a");
+    EditScene(&a, a.FindByName("Hall").key,
+              [](content::Scene* scene) { scene->entities[0].signpost.text = "Changed"; });
+    ExtendMap(&a, a.FindByName("Hall").key, {0.1, 0, 0}, 51);
+    a.ChangeTours([](std::vector<Tour>* tours) { tours->front().minutes = 80; });
+  }
+  PushFrom("a");
+  EXPECT_THAT(LinesOf(PullTo("b", vera)), HasSubstr("'Hall' was updated"));
+  EXPECT_EQ(NamesIn(Open("b")), "Desk,Hall");
+  EXPECT_EQ(DifferenceOf("Hall", folder_ / "a", folder_ / "b"), "");
+  const std::vector<Tour> tours = Open("b").Tours();
+  ASSERT_EQ(tours.size(), 2u);
+  EXPECT_EQ(tours[0].name, "Long");
+  EXPECT_EQ(tours[0].minutes, 80);
+  EXPECT_THAT(PullTo("b", vera).lines, IsEmpty());
+}
+
 TEST_F(HubRestore, AnEditedTourStaysAndIsPushedAgain) {
   ShareMapAndBackUp();
   {

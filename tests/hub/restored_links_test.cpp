@@ -56,6 +56,14 @@ TEST(RestoredLinks, AMapThatOthersSavedSinceIsComparedAnew) {
   EXPECT_EQ(Remaining({RestoredAt("first", 5)}, LinkAt(7), 6, false), "5") << "a visitor takes the hub's";
 }
 
+TEST(RestoredLinks, AMapThatTheBackupLackedIsTakenFromTheHubByAVisitor) {
+  const HubRestoration without{"first", {}, {}};
+  for (const std::int64_t on_hub : {1, 2, 3}) {
+    EXPECT_EQ(Remaining({without}, LinkAt(2), on_hub), "0 changed") << on_hub;
+    EXPECT_EQ(Remaining({without}, LinkAt(2), on_hub, false), std::to_string(on_hub + 1));
+  }
+}
+
 TEST(RestoredLinks, EachLaterRestorationCounts) {
   const std::vector<HubRestoration> both = {RestoredAt("first", 5), RestoredAt("second", 8)};
   EXPECT_EQ(Remaining(both, LinkAt(5), 8), "5");
