@@ -41,15 +41,27 @@ void HubFollower::Tell(const std::string& sentence) {
 }
 
 SyncReport HubFollower::PullAndTell() {
-  SyncReport report = Pull(options_);
+  SyncReport report;
+  try {
+    Pull(options_, &report);
+  } catch (...) {
+    // What was pulled before the connection was lost is in the library, and the next pull finds it there.
+    TellOf(report);
+    lines_.insert(report.lines.begin(), report.lines.end());
+    throw;
+  }
   if (!is_connected_) Tell("connected to the hub; the library follows it");
   is_connected_ = true;
+  TellOf(report);
+  lines_ = {report.lines.begin(), report.lines.end()};
+  return report;
+}
+
+void HubFollower::TellOf(const SyncReport& report) {
   for (const std::string& line : report.lines) {
     if (!lines_.contains(line) && callbacks_.told) callbacks_.told(line);
   }
-  lines_ = {report.lines.begin(), report.lines.end()};
   if (!report.changed_keys.empty() && callbacks_.pulled) callbacks_.pulled(report);
-  return report;
 }
 
 void HubFollower::FollowConnected(const std::stop_token& stop) {

@@ -34,6 +34,7 @@ class HubFollower {
   // Pulls until the connection is lost, which throws.
   void FollowConnected(const std::stop_token& stop);
   SyncReport PullAndTell();
+  void TellOf(const SyncReport& report);
   void Tell(const std::string& sentence);
 
   SyncOptions options_;

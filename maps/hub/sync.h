@@ -57,5 +57,7 @@ struct SyncReport {
 SyncReport Push(const SyncOptions& options);
 // Brings the changes of the hub into the library. Changes that were made here and not pushed are kept.
 SyncReport Pull(const SyncOptions& options);
+// The same. If it throws, `report` says what was done until then; the library keeps that.
+void Pull(const SyncOptions& options, SyncReport* report);
 
 }  // namespace docent::maps

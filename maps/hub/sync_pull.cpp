@@ -228,24 +228,40 @@ void PullNearestFirst(SyncSession* session, std::vector<HubHead> heads) {
   }
 }
 
-}  // namespace
-
-SyncReport Pull(const SyncOptions& options) {
-  SyncSession session(options, CreateIfMissing::kYes);
+void PullAll(SyncSession* session) {
+  const SyncOptions& options = session->options();
   for (const std::string& name : options.maps) {
-    if (session.HeadNamed(name) == nullptr) throw Error("the hub has no map named '" + name + "'");
+    if (session->HeadNamed(name) == nullptr) throw Error("the hub has no map named '" + name + "'");
   }
-  ReserveKeysForMaps(&session);
-  if (!options.near.empty() && session.HeadNamed(options.near) == nullptr)
+  ReserveKeysForMaps(session);
+  if (!options.near.empty() && session->HeadNamed(options.near) == nullptr)
     throw Error("the hub has no map named '" + options.near + "'");
-  std::vector<HubHead> heads = session.heads();
+  std::vector<HubHead> heads = session->heads();
   std::erase_if(heads, [&](const HubHead& head) {
     return !options.maps.empty() && (head.removed || std::find(options.maps.begin(), options.maps.end(),
                                                                head.name) == options.maps.end());
   });
-  PullNearestFirst(&session, std::move(heads));
-  if (options.maps.empty()) PullTours(&session);
-  return session.report();
+  PullNearestFirst(session, std::move(heads));
+  if (options.maps.empty()) PullTours(session);
+}
+
+}  // namespace
+
+SyncReport Pull(const SyncOptions& options) {
+  SyncReport report;
+  Pull(options, &report);
+  return report;
+}
+
+void Pull(const SyncOptions& options, SyncReport* report) {
+  SyncSession session(options, CreateIfMissing::kYes);
+  try {
+    PullAll(&session);
+  } catch (...) {
+    *report = session.report();
+    throw;
+  }
+  *report = session.report();
 }
 
 }  // namespace docent::maps

@@ -4,6 +4,7 @@
 #include <atomic>
 #include <future>
 #include <mutex>
+#include <set>
 #include <thread>
 
 #include "app/session/library_scene.h"
@@ -139,6 +140,42 @@ TEST_F(HubFollow, AMapThatCouldNotBePulledIsReportedOnceAndTriedAgain) {
       << told.All();
   const std::string all = told.All();
   EXPECT_EQ(all.find("was not updated"), all.rfind("was not updated")) << all;
+}
+
+TEST_F(HubFollow, WhatWasPulledBeforeTheHubWasGoneIsReported) {
+  std::set<std::uint64_t> keys;
+  {
+    Library a = OpenSampleLibrary(folder_ / "a");
+    for (const char* name : {"Desk", "Hall"}) AddSampleMap(&a, name, 7);
+  }
+  Push(SampleSync(Url(), folder_ / "a"));
+  Pull(SampleSync(Url(), folder_ / "b"));
+  for (const MapInfo& info : OpenToRead(folder_ / "b").List()) keys.insert(info.key);
+  for (const char* name : {"Desk", "Hall"}) AddSampleSignpost(folder_ / "a", name, "sign-2", "New");
+  Push(SampleSync(Url(), folder_ / "a"));
+  SyncOptions options = SampleSync(Url(), folder_ / "b");
+  std::atomic<int> asked = 0;
+  options.near_key = [&] {
+    if (++asked == 2) server().Stop();  // Before the second map.
+    return std::uint64_t{0};
+  };
+  Told told;
+  HubFollower::Callbacks callbacks = told.Callbacks();
+  std::set<std::uint64_t> pulled;
+  callbacks.pulled = [&](const SyncReport& report) {
+    const std::scoped_lock lock(told.mutex);
+    pulled.insert(report.changed_keys.begin(), report.changed_keys.end());
+  };
+  const auto pulled_keys = [&] {
+    const std::scoped_lock lock(told.mutex);
+    return pulled;
+  };
+  HubFollower follower(options, callbacks);
+  EXPECT_TRUE(WaitUntil([&] { return told.All().find("the tour continues") != std::string::npos; }, 10s))
+      << told.All();
+  EXPECT_EQ(pulled_keys().size(), 1u) << told.All();
+  server().Start();
+  EXPECT_TRUE(WaitUntil([&] { return pulled_keys() == keys; }, 10s)) << told.All();
 }
 
 TEST_F(HubFollow, AFollowerEndsWithoutAHub) {
