@@ -7,6 +7,7 @@
 #include <nlohmann/json.hpp>
 #include <set>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include "maps/hub/hub.h"
@@ -52,6 +53,13 @@ std::vector<std::string> LinesOfFile(const std::filesystem::path& file) {
   if (!stream) throw Error(file.string() + " cannot be read");
   for (std::string line; std::getline(stream, line);) lines.push_back(line);
   return lines;
+}
+
+// Whether the last line of a file has no end, as after a full disk.
+bool EndsWithinLine(const std::filesystem::path& file) {
+  std::ifstream stream(file, std::ios::binary);
+  char last = '\n';
+  return stream.seekg(-1, std::ios::end) && stream.get(last) && last != '\n';
 }
 
 std::size_t SendVisits(HubConnection* connection, const VisitsJson& records) {
@@ -121,9 +129,12 @@ std::size_t CollectVisits(const std::string& url, const std::filesystem::path& f
     if (std::filesystem::exists(file)) {
       for (std::string& line : LinesOfFile(file)) there.insert(std::move(line));
     }
+    // A record that was cut off stays a line of its own, and costs no other one.
+    bool is_cut_off = EndsWithinLine(file);
     std::ofstream stream(file, std::ios::app);
     for (const std::string& line : lines) {
       if (!there.insert(line).second) continue;
+      if (std::exchange(is_cut_off, false)) stream << '\n';
       stream << line << '\n';
       ++added;
     }

@@ -51,6 +51,20 @@ TEST_F(HubVisits, AreHandedInOnceAndCollectedByCurators) {
     EXPECT_NE(ErrorOfHubSql(visitor, sql), "") << sql;
 }
 
+TEST_F(HubVisits, AreCollectedAfterALineThatAFullDiskHasCutOff) {
+  const std::string file = "visits-2026-11-24.jsonl", one = "{\"a\": 1}\n", two = "{\"a\": 2}\n";
+  Write("device/" + file, one + two);
+  HandInVisits(Url(), folder_ / "device");
+  Write("all/" + file, one + "{\"a\"");
+  EXPECT_EQ(CollectVisits(Url(), folder_ / "all"), 1u);
+  EXPECT_EQ(Read("all/" + file), one + "{\"a\"\n" + two);
+  EXPECT_EQ(CollectVisits(Url(), folder_ / "all"), 0u);
+  // Of a whole record only the end of its line is missing.
+  Write("all/" + file, "{\"a\": 1}");
+  EXPECT_EQ(CollectVisits(Url(), folder_ / "all"), 1u);
+  EXPECT_EQ(Read("all/" + file), one + two);
+}
+
 TEST_F(HubVisits, ARestorationReplacesNoHubThatHasRecords) {
   BackUpHub(Url(), folder_ / "empty.hub");
   Write("device/visits-2026-11-24.jsonl", "{\"a\": 1}\n");
