@@ -36,7 +36,7 @@ class HubCommand : public WithHubServer {
 TEST_F(HubCommand, TakesTwoDevicesFromNothingToOneHub) {
   const std::string url = server().Url("museum");
   EXPECT_THAT(Succeed({"hub", "init", url}), HasSubstr("ready in a new database"));
-  EXPECT_THAT(Succeed({"hub", "init", url}), HasSubstr("there already"));
+  EXPECT_THAT(Succeed({"hub", "init", url}), HasSubstr("already exists"));
   Succeed({"hub", "user", "add", "anna", "--role", "curator", "--hub", url});
   Succeed({"hub", "user", "add", "kiosk", "--role", "visitor", "--hub", url});
   EXPECT_THAT(Succeed({"hub", "user", "list", "--hub", url}), HasSubstr("anna"));
@@ -55,7 +55,7 @@ TEST_F(HubCommand, TakesTwoDevicesFromNothingToOneHub) {
               testing::AllOf(HasSubstr("anna, curator"), HasSubstr("Desk")));
   Succeed({"maps", "rename", "Desk", "Table", "--library", Path("a.docent")});
   Succeed({"maps", "push", "--library", Path("a.docent"), "--hub", anna});
-  EXPECT_THAT(Succeed({"hub", "revert", "Table", "1", "--hub", anna}), HasSubstr("this is revision 3"));
+  EXPECT_THAT(Succeed({"hub", "revert", "Table", "1", "--hub", anna}), HasSubstr("saved as revision 3"));
   Succeed({"maps", "pull", "Desk", "--library", Path("b.docent"), "--hub", kiosk});
   EXPECT_EQ(NamesIn(OpenSampleLibrary(Path("b.docent"))), "Desk");
   {

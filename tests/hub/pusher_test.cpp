@@ -102,7 +102,7 @@ TEST_F(HubPush, AnEndWithoutAHubSaysThatSomethingIsMissing) {
   HubPusher pusher(SampleSync("postgresql://x@%2Fnowhere/docent", folder_ / "a"), Tell());
   pusher.LibraryWasSaved();
   EXPECT_FALSE(pusher.Finish());
-  EXPECT_THAT(Told(), HasSubstr("everything is saved here"));
+  EXPECT_THAT(Told(), HasSubstr("changes are saved in the library"));
   EXPECT_LT(Clock::now() - start, 5s);
 }
 
