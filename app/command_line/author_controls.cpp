@@ -34,10 +34,11 @@ bool ChooseToPlace(const std::string& file, ui::AuthoringChoices* choices) {
   return false;
 }
 
-// Whether commands are no longer for the map that the camera was in.
-bool LeavesMap(const Command& done) {
-  return std::holds_alternative<NewMap>(done) || std::holds_alternative<StopMap>(done) ||
-         std::holds_alternative<UseMap>(done) || std::holds_alternative<RemoveMap>(done);
+// Whether commands are no longer for the map with this name, which the camera was in.
+bool LeavesMap(const Command& done, const std::string& map) {
+  if (const auto* use = std::get_if<UseMap>(&done)) return use->name != map;
+  if (const auto* remove = std::get_if<RemoveMap>(&done)) return remove->name == map;
+  return std::holds_alternative<NewMap>(done) || std::holds_alternative<StopMap>(done);
 }
 
 }  // namespace
@@ -73,7 +74,9 @@ void AuthorControls::Take(const std::vector<Notice>& notices) {
     board_.AddError(notice.problem);
     if (!notice.done) continue;
     board_.AddDone(DoneText(*notice.done), CanBeUndone(*notice.done), Now());
-    leaves_map_ = leaves_map_ || LeavesMap(*notice.done);
+    leaves_map_ = leaves_map_ || LeavesMap(*notice.done, map_name_);
+    const auto* const renamed_map = std::get_if<app::RenameMap>(&*notice.done);
+    if (renamed_map != nullptr && renamed_map->name == map_name_) map_name_ = renamed_map->new_name;
     if (const auto* renamed = std::get_if<RenameEntity>(&*notice.done))
       selection_.Rename(renamed->name, renamed->new_name);
   }
@@ -107,6 +110,7 @@ void AuthorControls::KeepContent() {
     if (leaves_map_ || !view_.frame->shown.starting_map.empty()) content_.reset();
     return;
   }
+  map_name_ = view_.frame->shown.map_name;
   if (!content_) leaves_map_ = false;
   if (!view_.scene) return;
   content_ = view_.scene;

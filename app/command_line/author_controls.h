@@ -129,6 +129,7 @@ class AuthorControls final : public CommandActions {
   // Names before a command that adds entities, which are selected when they appear.
   std::optional<std::vector<std::string>> names_before_;
   std::uint64_t scene_map_ = 0;  // The map whose entities are selected.
+  std::string map_name_;         // Its name.
   // What the panel shows of that map, as it was seen last, so that what is being written there is not lost
   // with the camera. The content is null before it was seen, and while a lost camera is meant to leave the
   // map.

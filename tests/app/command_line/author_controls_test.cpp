@@ -44,7 +44,7 @@ class AuthorAtControls : public ::testing::Test {
       const Eigen::Vector2i size = window_->WindowSize();
       const ui::WindowLayout layout =
           ui::LayOutWindow(size.x(), size.y(), 1, controls_->choices().panel_open);
-      controls_->SetView(Seen(layout), {}, {});
+      controls_->SetView(Seen(layout), saving_, {});
       controls_->Update();
       controls_->Draw(layout);
       window_->Show();
@@ -88,6 +88,12 @@ class AuthorAtControls : public ::testing::Test {
     Act("key ctrl+a sleep 0.1 type --delay 60 Cove");
   }
   void PressReturn() { Act("keydown Return sleep 0.1 keyup Return sleep 0.1"); }
+  void LoseTheCamera() {
+    is_in_map_ = false;
+    Draw(3);
+    is_in_map_ = true;
+    Draw(3);
+  }
 
   const TemporaryFolder folder_;
   VirtualScreen screen_{"1280x1024"};
@@ -95,15 +101,13 @@ class AuthorAtControls : public ::testing::Test {
   std::vector<Command> commands_;
   std::optional<ui::Window> window_;
   std::optional<AuthorControls> controls_;
+  SavingState saving_;
   bool is_in_map_ = true;
 };
 
 TEST_F(AuthorAtControls, WhatIsBeingWrittenIsNotLostWithTheCamera) {
   WriteName();
-  is_in_map_ = false;
-  Draw(3);
-  is_in_map_ = true;
-  Draw(3);
+  LoseTheCamera();
   EXPECT_THAT(commands_, IsEmpty());
   PressReturn();
   EXPECT_THAT(commands_, ElementsAre(Command(RenameEntity{"sign-1", "Cove"})));
@@ -122,6 +126,37 @@ TEST_F(AuthorAtControls, NothingIsWrittenToTheMapThatTheAuthorGoesTo) {
   controls_->Take({Notice{"", UseMap{"Room"}}});
   Draw(3);
   is_in_map_ = false;
+  Draw(3);
+  PressReturn();
+  EXPECT_THAT(commands_, IsEmpty());
+}
+
+TEST_F(AuthorAtControls, WhatIsBeingWrittenIsNotLostBecauseAnotherMapWasRemoved) {
+  controls_->Take({Notice{"", RemoveMap{"Room"}}});
+  Draw(3);
+  WriteName();
+  LoseTheCamera();
+  PressReturn();
+  EXPECT_THAT(commands_, ElementsAre(Command(RenameEntity{"sign-1", "Cove"})));
+}
+
+TEST_F(AuthorAtControls, WhatIsBeingWrittenIsNotLostByContinuingItsMap) {
+  WriteName();
+  is_in_map_ = false;
+  Draw(3);
+  controls_->Take({Notice{"", UseMap{"Hall"}}});
+  Draw(3);
+  is_in_map_ = true;
+  Draw(3);
+  PressReturn();
+  EXPECT_THAT(commands_, ElementsAre(Command(RenameEntity{"sign-1", "Cove"})));
+}
+
+TEST_F(AuthorAtControls, NothingIsWrittenToAMapThatWasRenamedAndRemovedWhileTheCameraWasLost) {
+  WriteName();
+  is_in_map_ = false;
+  Draw(3);
+  controls_->Take({Notice{"", RenameMap{"Hall", "Lobby"}}, Notice{"", RemoveMap{"Lobby"}}});
   Draw(3);
   PressReturn();
   EXPECT_THAT(commands_, IsEmpty());
