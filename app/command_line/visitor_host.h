@@ -64,6 +64,7 @@ class VisitorHost {
   std::optional<Speech> speech_;
   std::optional<LeftTour> left_tour_;  // Of the first camera; only of a kiosk, and of a tour with stops.
   std::optional<VisitKeeper> visits_;  // Of the first camera; only with a folder for their records.
+  double guided_s_ = 0;                // Of the first camera's last image.
   int visitors_before_ = 0;            // See ShownFrame.
   std::vector<SoundDirector::Key> asked_sounds_;
 };

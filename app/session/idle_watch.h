@@ -5,8 +5,8 @@
 
 namespace docent::app {
 
-// Notices that nobody uses a device: its image has hardly changed for a while, or there was none. One camera;
-// one thread.
+// Notices that nobody uses a device: for a while its image has hardly changed, or there was none, and nobody
+// did anything with it. One camera; one thread.
 class IdleWatch {
  public:
   // The device counts as left after so long, in seconds.
@@ -15,13 +15,18 @@ class IdleWatch {
   // An image (CV_8UC1 or CV_8UC3, not empty) and its time in seconds, which does not decrease. Returns true
   // once when the device has been left, and not again before it is used.
   bool Update(double seconds, const cv::Mat& image);
+  // Somebody did something with the device, at the time of the last image.
+  void Use(double seconds) {
+    changed_s_ = seconds;
+    is_left_ = false;
+  }
   // Whether the device is left at present.
   bool is_left() const { return is_left_; }
 
  private:
   const double idle_s_;
-  cv::Mat reference_;     // Small and grey, of the last change.
-  double changed_s_ = 0;  // Its time.
+  cv::Mat reference_;     // Small and grey, of the last change of the image.
+  double changed_s_ = 0;  // Its time, or when the device was used since.
   double last_s_ = 0;     // Of the last image.
   bool is_left_ = false;
 };

@@ -86,5 +86,32 @@ TEST(LeftTour, DoesNotAskWhereNothingWasBegunOrNobodyCanAnswer) {
   }
 }
 
+TEST(LeftTour, IsNotLeftByWhoUsesTheDeviceUnseen) {
+  Device kiosk(false);
+  for (int i = 0; i < 5; ++i) {
+    EXPECT_EQ(kiosk.Lie(250), 0);
+    kiosk.tour.Use(kiosk.now_s - 1);
+  }
+  EXPECT_EQ(kiosk.Lie(299), 0);
+  EXPECT_EQ(kiosk.Lie(100), 1);
+  EXPECT_TRUE(kiosk.tour.is_between_visits());
+  kiosk.tour.Use(kiosk.now_s - 1);
+  EXPECT_FALSE(kiosk.tour.is_between_visits()) << "somebody is there again";
+}
+
+TEST(LeftTour, AsksWhoeverUsesADeviceThatWasLeftUnlessThatIsTheAnswer) {
+  Device device(true);
+  device.Lie(400);
+  device.tour.Use(device.now_s - 1);
+  EXPECT_EQ(device.Lie(10), 0);
+  EXPECT_TRUE(device.tour.is_asking());
+  device.tour.Answer();
+  device.Lie(400);
+  device.tour.Use(device.now_s - 1);  // The menu says whether the tour goes on.
+  device.tour.Answer();
+  EXPECT_EQ(device.Lie(10), 0);
+  EXPECT_FALSE(device.tour.is_asking());
+}
+
 }  // namespace
 }  // namespace docent::app

@@ -1,0 +1,84 @@
+// SPDX-License-Identifier: Apache-2.0
+// How a tour notices that its visitor has left, and what becomes of the records of visits.
+#include "app/command_line/visitor_host.h"
+
+#include <gmock/gmock.h>
+
+#include "tests/app/support/simulated_session.h"
+#include "tests/app/support/temporary_folder.h"
+
+namespace docent::app {
+namespace {
+
+using namespace simulated_session;
+using ::testing::DoubleEq;
+using ::testing::Field;
+using ::testing::IsEmpty;
+using ::testing::UnorderedElementsAre;
+
+// A kiosk whose camera is fixed and always sees the first stop, so that only its screen tells that somebody
+// is there. It has an image a second.
+class KioskOnAStand : public ::testing::Test {
+ protected:
+  KioskOnAStand() {
+    request_.kiosk_code = "1234";
+    request_.language = "en";
+    request_.visit_log = folder_.path();
+    request_.tour = "Highlights";
+    request_.route.emplace();
+    request_.route->stops = {{1, "Desk"}, {2, "Door"}, {3, "Window"}};
+    host_.emplace(request_, &session_, 1, [](const Event&) {});
+  }
+  void Stand(int duration_s) {
+    for (int i = 0; i < duration_s; ++i, ++now_s_) {
+      frame_ = std::make_shared<ShownFrame>();
+      frame_->seconds = now_s_;
+      frame_->tracked.frame.image = cv::Mat(48, 64, CV_8UC1, cv::Scalar(120));
+      frame_->tracked.state = engine::TrackingState::kSixDof;
+      frame_->tracked.map_key = 1;
+      frame_->shown.map_name = "Desk";
+      host_->Guide(0, simulation_->camera(), frame_);
+    }
+  }
+  void Touch(GuideVisitor::Step step) { host_->Lead(GuideVisitor{step, {}}, frame_->tracked); }
+  std::vector<VisitRecord> Visits() {
+    host_->Finish();
+    std::vector<std::string> problems;
+    std::vector<VisitRecord> visits = ReadVisits(folder_.path(), &problems);
+    EXPECT_THAT(problems, IsEmpty());
+    return visits;
+  }
+
+  const TemporaryFolder folder_;
+  const std::shared_ptr<const Simulation> simulation_ = Room(3);
+  Session session_{Options(Pace::kLockstep, "Desk"), LensOf(*simulation_), nullptr};
+  GuideRequest request_;
+  std::optional<VisitorHost> host_;
+  std::shared_ptr<ShownFrame> frame_;
+  int now_s_ = 0;
+};
+
+TEST_F(KioskOnAStand, RecordsTheVisitOfWhoOnlyTouchesIt) {
+  Stand(200);
+  Touch(GuideVisitor::Step::kSkip);
+  Stand(100);
+  Touch(GuideVisitor::Step::kBack);
+  Stand(200);
+  // The first one is counted from the start until nobody was there for two minutes.
+  EXPECT_THAT(Visits(), UnorderedElementsAre(Field(&VisitRecord::duration_s, DoubleEq(119)),
+                                             Field(&VisitRecord::duration_s, DoubleEq(218))));
+}
+
+TEST_F(KioskOnAStand, DoesNotBeginAnewWhileItIsTouched) {
+  for (int i = 0; i < 5; ++i) {
+    Stand(100);
+    Touch(i % 2 == 0 ? GuideVisitor::Step::kSkip : GuideVisitor::Step::kBack);
+  }
+  Stand(1);
+  EXPECT_EQ(frame_->visitors_before, 0);
+  Stand(200);
+  EXPECT_EQ(frame_->visitors_before, 1);
+}
+
+}  // namespace
+}  // namespace docent::app
