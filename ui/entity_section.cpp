@@ -165,6 +165,9 @@ void EntitySection::DrawRow(const content::Entity& entity, const AuthoringFacts&
 }
 
 void EntitySection::DrawSelected(const AuthoringFacts& facts) {
+  // Nobody writes on in a field that was not drawn, as while the panel was closed.
+  const int frame = ImGui::GetFrameCount();
+  if (std::exchange(last_frame_, frame) < frame - 1) is_writing_ = false;
   FollowRename(facts);
   if (const content::Entity* const shown = EntityToShow(facts)) {
     DrawFields(*shown, facts);

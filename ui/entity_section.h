@@ -42,6 +42,7 @@ class EntitySection {
 
   AuthoringActions* const actions_;
   bool begin_rename_ = false, is_writing_ = false;
+  int last_frame_ = 0;           // Of Dear ImGui; in which the fields were drawn last.
   std::string shown_;            // The entity that the fields belong to; empty for none.
   std::uint64_t shown_map_ = 0;  // The map that it is in.
   std::string asked_name_;       // The new name of it that was asked for; empty for none.

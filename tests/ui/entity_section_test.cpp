@@ -27,7 +27,9 @@ class FieldsOfEntities : public PanelWithoutScreen {
     selection_.Set({"sign-1"});
     for (int i = 0; i < 3; ++i) Draw();
   }
-  void DrawPart() override { section_.DrawSelected(facts_); }
+  void DrawPart() override {
+    if (is_panel_open_) section_.DrawSelected(facts_);
+  }
 
   // The first fields are below each other; a click at the right end puts the cursor behind the text.
   static float FirstLine() { return ImGui::GetStyle().WindowPadding.y + 0.5f * ImGui::GetFrameHeight(); }
@@ -43,6 +45,7 @@ class FieldsOfEntities : public PanelWithoutScreen {
   content::Scene scene_;
   Selection selection_;
   EntitySection section_{&asked_};
+  bool is_panel_open_ = true;
 };
 
 TEST_F(FieldsOfEntities, WhatIsBeingWrittenBelongsToTheEntityThatWasSelected) {
@@ -103,6 +106,21 @@ TEST_F(FieldsOfEntities, AFieldIsWrittenOnWhileTheEntityGetsItsNewName) {
   Type("?");
   ClickImageAndSelect({});
   EXPECT_THAT(asked_.words, ElementsAre("rename sign-1 sign-1b", "text sign-1b Elephants!?"));
+}
+
+TEST_F(FieldsOfEntities, AfterThePanelWasClosedTheNameIsThatOfTheEntityThatIsSelectedThen) {
+  ClickName();
+  Type("b");
+  is_panel_open_ = false;
+  for (int i = 0; i < 3; ++i) Draw();
+  selection_.Set({"sign-2"});
+  section_.BeginRename();
+  is_panel_open_ = true;
+  for (int i = 0; i < 3; ++i) Draw();
+  ASSERT_TRUE(WritesText());
+  Type("Lions");  // The whole name is chosen at first.
+  ClickImage();
+  EXPECT_THAT(asked_.words, ElementsAre("rename sign-2 Lions"));
 }
 
 }  // namespace
