@@ -50,12 +50,15 @@ struct Gui::Impl {
   ImGuiContext* context = nullptr;
   double scale = 0;
   int focus_frames = 0;  // During which a window that FocusWindow chose keeps the keyboard in any case.
+  int leave_frames = 0;  // Until the field is left that LeaveField leaves; 0 for none.
 
   std::string window_to_focus;  // By the next frame; empty for none.
 
   void Use() const { ImGui::SetCurrentContext(context); }
   // Within a frame, because Dear ImGui forgets such requests between frames.
   void Focus();
+  // Within a frame too: only a field that loses the keyboard there says that it was changed.
+  void Leave();
 };
 
 void Gui::Impl::Focus() {
@@ -67,6 +70,10 @@ void Gui::Impl::Focus() {
   ImGui::GetCurrentContext()->NavDisableHighlight = false;
   constexpr int kFocusFrames = 5;
   focus_frames = kFocusFrames;
+}
+
+void Gui::Impl::Leave() {
+  if (leave_frames > 0 && --leave_frames == 0) ImGui::ClearActiveID();
 }
 
 Gui::Gui(Window* window) : impl_(std::make_unique<Impl>()) {
@@ -107,6 +114,7 @@ void Gui::Begin(double scale) {
   ImGui_ImplGlfw_NewFrame();
   ImGui::NewFrame();
   impl_->Focus();
+  impl_->Leave();
 }
 
 void Gui::Draw() {
@@ -147,6 +155,14 @@ void Gui::FocusWindow(const char* name) {
 void Gui::LeaveWidgets() {
   impl_->Use();
   ImGui::SetWindowFocus(nullptr);
+}
+
+void Gui::LeaveField() {
+  impl_->leave_frames = 2;
+}
+
+bool Gui::IsLeavingField() const {
+  return impl_->leave_frames > 0;
 }
 
 }  // namespace docent::ui

@@ -34,6 +34,11 @@ class Gui {
   // Lets the keyboard go through the widgets of a window from the next frame on, or leave all widgets.
   void FocusWindow(const char* name);
   void LeaveWidgets();
+  // Lets the text field that is being written be left as by a click elsewhere, so that what was typed becomes
+  // a change. It is left in the second frame from now on, since what was typed last reaches it in the first.
+  void LeaveField();
+  // Whether that frame has not begun yet.
+  bool IsLeavingField() const;
 
  private:
   struct Impl;

@@ -44,7 +44,7 @@ bool LeavesMap(const Command& done, const std::string& map) {
 }  // namespace
 
 AuthorControls::AuthorControls(ui::Window* window, Host host, std::filesystem::path model_folder)
-    : CommandActions(host.emit),
+    : CommandActions([this](Command command) { Emit(std::move(command)); }),
       window_(window),
       host_(std::move(host)),
       gui_(window),
@@ -173,10 +173,7 @@ void AuthorControls::Escape() {
 void AuthorControls::HandleKey(const ui::InputEvent& event) {
   ui::AuthoringChoices& choices = panel_.choices();
   if (event.key == "f11" && !event.repeated) return ToggleFullScreen();
-  if (event.key == "f9" && !event.repeated) {
-    choices.panel_open = !choices.panel_open;
-    return;
-  }
+  if (event.key == "f9" && !event.repeated) return TogglePanel();
   if (event.control && event.key == "q") return AskToQuit();
   if (event.control && event.key == "s") return Save();
   if (gui_.WritesText()) return;
@@ -266,7 +263,7 @@ void AuthorControls::Place(const ui::AuthoringChoices& choices, const Eigen::Vec
   if (!note.empty()) board_.AddDone(note, false, Now());
   if (!command) return;
   if (!std::holds_alternative<ExtendTrail>(*command)) RememberNames();
-  host_.emit(*std::move(command));
+  Emit(*std::move(command));
   const std::string& file = choices.model_file;
   std::error_code error;
   if (choices.tool != ui::AuthoringTool::kModel || !std::filesystem::exists(file, error)) return;
@@ -379,6 +376,7 @@ double AuthorControls::Draw(const ui::WindowLayout& layout) {
     if (panel_.choices().frozen) overlay.DrawBanner(ui::strings::kFrozen);
   }
   panel_.Draw(layout, facts);
+  GoOnAfterWriting();
   const double height = ui::DrawMessages(layout, &board_, this);
   quit_dialog_.Draw(layout, this);
   gui_.Draw();
@@ -393,16 +391,39 @@ void AuthorControls::Fit(ui::FitStep step) {
     case ui::FitStep::kRemoveLast:
       return fitting_.RemoveLast();
     case ui::FitStep::kAlign:
-      return host_.emit(fitting_.AlignCommand());
+      return Emit(fitting_.AlignCommand());
     case ui::FitStep::kBend:
-      return host_.emit(fitting_.BendCommand());
+      return Emit(fitting_.BendCommand());
     case ui::FitStep::kEnd:
       return fitting_.End();
   }
 }
 
+void AuthorControls::Emit(Command command) {
+  has_emitted_ = true;
+  host_.emit(std::move(command));
+}
+
+void AuthorControls::TogglePanel() {
+  bool& is_open = panel_.choices().panel_open;
+  closes_panel_ = is_open && gui_.WritesText();
+  if (closes_panel_) return gui_.LeaveField();
+  is_open = !is_open;
+}
+
 void AuthorControls::AskToQuit() {
-  if (!saving_.unsaved) return Quit(true);
+  is_quitting_ = true;
+  has_emitted_ = false;
+  if (gui_.WritesText()) return gui_.LeaveField();
+  GoOnAfterWriting();
+}
+
+void AuthorControls::GoOnAfterWriting() {
+  if (gui_.IsLeavingField()) return;
+  if (std::exchange(closes_panel_, false)) panel_.choices().panel_open = false;
+  if (!std::exchange(is_quitting_, false)) return;
+  // What was written is not in the state of saving before it was carried out.
+  if (!saving_.unsaved && !has_emitted_) return Quit(true);
   quit_dialog_.Open();
 }
 
@@ -439,13 +460,13 @@ void AuthorControls::Select(const std::string& name, bool add) {
 }
 
 void AuthorControls::RemoveSelected() {
-  if (!selection_.empty()) host_.emit(RemoveEntities{selection_.names()});
+  if (!selection_.empty()) Emit(RemoveEntities{selection_.names()});
 }
 
 void AuthorControls::DuplicateSelected() {
   if (selection_.empty()) return;
   RememberNames();
-  host_.emit(DuplicateEntities{selection_.names()});
+  Emit(DuplicateEntities{selection_.names()});
 }
 
 void AuthorControls::CopySelected() {
@@ -461,7 +482,7 @@ void AuthorControls::Paste() {
   PasteEntities command{copied_names_, copied_from_, std::nullopt};
   const Eigen::Vector2d point = window_->PointerPosition();
   if (!gui_.WantsMouse() && view_.ShowsImageAt(point)) command.to_pixel = view_.PixelAt(point);
-  host_.emit(std::move(command));
+  Emit(std::move(command));
 }
 
 // Under the first unused name of "group-1", "group-2" ...
@@ -473,7 +494,7 @@ void AuthorControls::Group(const std::vector<std::string>& names) {
   };
   int number = 1;
   while (is_used("group-" + std::to_string(number))) ++number;
-  host_.emit(GroupEntities{names, "group-" + std::to_string(number)});
+  Emit(GroupEntities{names, "group-" + std::to_string(number)});
 }
 
 // The view is frozen while a length is measured, so that both points are those of one image.
@@ -483,13 +504,13 @@ void AuthorControls::HandlePick(const Eigen::Vector2d& pixel) {
     case ui::MapPick::kNone:
       return;
     case ui::MapPick::kFloor:
-      return host_.emit(SetMapUp{pixel});
+      return Emit(SetMapUp{pixel});
     case ui::MapPick::kMeasureFrom:
       measured_from_ = pixel;
       choices.pick = ui::MapPick::kMeasureTo;
       return;
     case ui::MapPick::kMeasureTo:
-      host_.emit(SetMapScale{measured_from_, pixel, choices.length_m});
+      Emit(SetMapScale{measured_from_, pixel, choices.length_m});
       choices.frozen = false;
       return;
   }

@@ -58,7 +58,7 @@ class AuthorControls final : public CommandActions {
   // Draws panel, messages, dialogs, outlines and handles. Returns the height at the bottom of the image that
   // the messages take, in window units.
   double Draw(const ui::WindowLayout& layout);
-  // Asks whether to save, unless nothing is unsaved.
+  // Asks whether to save, unless nothing is unsaved. What is being written becomes a change before.
   void AskToQuit();
   Ending ending() const { return ending_; }
   const ui::AuthoringChoices& choices() const { return panel_.choices(); }
@@ -82,6 +82,11 @@ class AuthorControls final : public CommandActions {
   // that.
   bool HandlePointerKey(const ui::InputEvent& event);
   void Escape();
+  void Emit(Command command);
+  // What is being written becomes a change before the panel closes.
+  void TogglePanel();
+  // Closes the panel, or quits, once no field is being written any more.
+  void GoOnAfterWriting();
   void HandleClick(const ui::InputEvent& event);
   void HandleDrop(const ui::InputEvent& event);
   void HandlePick(const Eigen::Vector2d& pixel);
@@ -136,7 +141,9 @@ class AuthorControls final : public CommandActions {
   std::shared_ptr<const content::Scene> content_;
   engine::Rotation3 map_from_upright_;
   engine::Rigid3 camera_from_map_;
-  bool leaves_map_ = false;  // By a command; until the camera is in a map again.
+  bool leaves_map_ = false;                          // By a command; until the camera is in a map again.
+  bool closes_panel_ = false, is_quitting_ = false;  // Once the field that is being written is left.
+  bool has_emitted_ = false;                         // Since the author began to quit.
   Ending ending_ = Ending::kNone;
 };
 

@@ -79,12 +79,15 @@ class AuthorAtControls : public ::testing::Test {
     hand.join();
     Draw(5);
   }
-  void WriteName() {
+  void BeginName() {
     controls_->Select("sign-1", false);
     ui::InputEvent rename;
     rename.key = "f2";
     controls_->Handle(rename);
     Draw(5);
+  }
+  void WriteName() {
+    BeginName();
     Act("key ctrl+a sleep 0.1 type --delay 60 Cove");
   }
   void PressReturn() { Act("keydown Return sleep 0.1 keyup Return sleep 0.1"); }
@@ -160,6 +163,42 @@ TEST_F(AuthorAtControls, NothingIsWrittenToAMapThatWasRenamedAndRemovedWhileTheC
   Draw(3);
   PressReturn();
   EXPECT_THAT(commands_, IsEmpty());
+}
+
+TEST_F(AuthorAtControls, WhatIsBeingWrittenIsACommandBeforeThePanelCloses) {
+  WriteName();
+  // Both keys come in one frame, as from a slow machine.
+  ASSERT_EQ(std::system("xdotool key d sleep 0.1 key F9 sleep 0.1"), 0);
+  Draw(5);
+  EXPECT_THAT(commands_, ElementsAre(Command(RenameEntity{"sign-1", "Coved"})));
+  EXPECT_FALSE(controls_->choices().panel_open);
+}
+
+TEST_F(AuthorAtControls, WhatIsBeingWrittenIsAChangeThatQuittingAsksAbout) {
+  WriteName();
+  Act("key ctrl+q");
+  EXPECT_THAT(commands_, ElementsAre(Command(RenameEntity{"sign-1", "Cove"})));
+  EXPECT_EQ(controls_->ending(), AuthorControls::Ending::kNone);
+  Act("key Return");
+  EXPECT_EQ(controls_->ending(), AuthorControls::Ending::kSave) << "the answer that is chosen at first";
+}
+
+TEST_F(AuthorAtControls, WhatIsBeingWrittenIsNotLostToTheQuestionWhetherToSave) {
+  saving_.unsaved = true;
+  WriteName();
+  ui::InputEvent close;
+  close.kind = ui::InputEvent::Kind::kClose;
+  controls_->Handle(close);
+  Draw(5);
+  EXPECT_THAT(commands_, ElementsAre(Command(RenameEntity{"sign-1", "Cove"})));
+  EXPECT_EQ(controls_->ending(), AuthorControls::Ending::kNone);
+}
+
+TEST_F(AuthorAtControls, QuittingAsksNothingWhereNothingWasWritten) {
+  BeginName();
+  Act("key ctrl+q");
+  EXPECT_THAT(commands_, IsEmpty());
+  EXPECT_EQ(controls_->ending(), AuthorControls::Ending::kSave);
 }
 
 }  // namespace
