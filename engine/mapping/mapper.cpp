@@ -67,8 +67,9 @@ void Mapper::RemoveOldTemporaryKeyFrames() {
   auto temporary = static_cast<std::size_t>(
       std::ranges::count_if(map.keyframes(), [](const auto& entry) { return !entry.second.keyframe.fixed; }));
   if (temporary <= options_.max_temporary_keyframes) return;
+  const KeyFrameId newest = map.keyframes().rbegin()->first;
   for (; temporary > options_.max_temporary_keyframes; --temporary)
-    CullKeyFrame(FindOldestKeyFrame(map), &map);
+    CullKeyFrame(FindOldestKeyFrame(newest, map), &map);
   workspace_.searcher.Clear();
   output_.Publish(map.Snapshot());
 }

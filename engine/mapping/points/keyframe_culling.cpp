@@ -69,19 +69,20 @@ KeyFrameId FindRedundantKeyFrame(const KeyFrameCullingOptions& options, KeyFrame
   return kNoId;
 }
 
-KeyFrameId FindOldestKeyFrame(const Map& map) {
-  const KeyFrame* oldest = nullptr;
+KeyFrameId FindOldestKeyFrame(KeyFrameId newest, const Map& map) {
+  const auto has_dependents = [&map](const KeyFrame& reference) {
+    return std::any_of(map.keyframes().begin(), map.keyframes().end(), [&](const auto& entry) {
+      const KeyFrame& other = entry.second.keyframe;
+      return other.kind == KeyFrameKind::kPanorama && other.panorama == reference.panorama;
+    });
+  };
   for (const auto& [id, record] : map.keyframes()) {
     const KeyFrame& keyframe = record.keyframe;
-    if (keyframe.fixed) continue;
-    if (!oldest) {
-      oldest = &keyframe;
-      if (oldest->kind == KeyFrameKind::kPanorama || oldest->panorama == kNoId) return id;
-    } else if (keyframe.kind == KeyFrameKind::kPanorama && keyframe.panorama == oldest->panorama) {
-      return id;
-    }
+    if (keyframe.fixed || id == newest) continue;
+    const bool is_reference = keyframe.kind != KeyFrameKind::kPanorama && keyframe.panorama != kNoId;
+    if (!is_reference || !has_dependents(keyframe)) return id;
   }
-  return oldest ? oldest->id : kNoId;
+  return kNoId;
 }
 
 void CullKeyFrame(KeyFrameId id, Map* map) {

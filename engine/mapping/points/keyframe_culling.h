@@ -26,10 +26,10 @@ struct KeyFrameCullingOptions {
 // is still being extended.
 KeyFrameId FindRedundantKeyFrame(const KeyFrameCullingOptions& options, KeyFrameId newest, Map* map);
 
-// Finds the keyframe with the lowest id that is not fixed; kNoId if all are. A panorama map is lost with its
-// reference, so instead of a reference it returns the first dependent keyframe of that panorama map that is
-// not fixed, if there is one.
-KeyFrameId FindOldestKeyFrame(const Map& map);
+// Finds the keyframe with the lowest id that may be removed; kNoId if there is none. Never returns a fixed
+// keyframe, the `newest`, which the camera sees now, or a reference on which keyframes of a panorama map
+// depend.
+KeyFrameId FindOldestKeyFrame(KeyFrameId newest, const Map& map);
 
 // Removes a keyframe but keeps its points: a point whose source it is gets the observer on the finest level
 // as its new source. Culling keeps the cost of a map proportional to the space that it covers and not to the

@@ -70,19 +70,30 @@ TEST(KeyFrameCulling, KeepsFixedKeyFramesAndReferences) {
 
 TEST(KeyFrameCulling, TheOldestKeyFrameIsNoReferenceOfOthers) {
   Map map = MapWithKeyFramesAt({0, 0.1, 0.2});
-  EXPECT_EQ(FindOldestKeyFrame(map), 1u) << "the first one is fixed";
+  EXPECT_EQ(FindOldestKeyFrame(Newest(map), map), 1u) << "the first one is fixed";
   const PanoramaId panorama = map.OpenPanorama(1);
-  EXPECT_EQ(FindOldestKeyFrame(map), 1u) << "no other keyframe needs it";
+  EXPECT_EQ(FindOldestKeyFrame(Newest(map), map), 1u) << "no other keyframe needs it";
   KeyFrame dependent = map.FindKeyFrame(1)->keyframe;
   dependent.kind = KeyFrameKind::kPanorama;
   const KeyFrameId first = map.AddKeyFrame(dependent).keyframe.id;
   map.AddKeyFrame(dependent);
   ASSERT_EQ(dependent.panorama, panorama);
-  EXPECT_EQ(FindOldestKeyFrame(map), first);
-  map.FindKeyFrame(1)->keyframe.fixed = true;
-  EXPECT_EQ(FindOldestKeyFrame(map), 2u);
+  EXPECT_EQ(FindOldestKeyFrame(Newest(map), map), 2u);
+  map.FindKeyFrame(2)->keyframe.fixed = true;
+  EXPECT_EQ(FindOldestKeyFrame(Newest(map), map), first);
   for (auto& [id, record] : map.keyframes()) record.keyframe.fixed = true;
-  EXPECT_EQ(FindOldestKeyFrame(map), kNoId);
+  EXPECT_EQ(FindOldestKeyFrame(Newest(map), map), kNoId);
+}
+
+TEST(KeyFrameCulling, TheOldestKeyFrameIsNotTheOneThatWasJustAdded) {
+  Map map = MapWithKeyFramesAt({0, 0.1, 0.2});
+  map.OpenPanorama(1);
+  KeyFrame dependent = map.FindKeyFrame(1)->keyframe;
+  dependent.kind = KeyFrameKind::kPanorama;
+  const KeyFrameId only = map.AddKeyFrame(dependent).keyframe.id;
+  EXPECT_EQ(FindOldestKeyFrame(only, map), 2u) << "a camera that came back and turns needs its new keyframe";
+  map.FindKeyFrame(2)->keyframe.fixed = true;
+  EXPECT_EQ(FindOldestKeyFrame(only, map), kNoId);
 }
 
 TEST(KeyFrameCulling, KeepsEnoughObserversOfEveryPoint) {
