@@ -97,7 +97,7 @@ void MapCommands::Apply(const RemoveMap& command, const engine::TrackedFrame& fr
     throw Error("the map '" + map->name + "' is " + maps::ToString(map->policy) + ": it cannot be removed");
   }
   if (saving_.FlushToLibrary(map->key, command.name, frame.frame.time, lock)) library_->Remove(map->key);
-  map->discarded = true;  // before the cameras leave the map, so that it is not saved again
+  map->Discard();  // before the cameras leave the map, so that it is not saved again
   system_.RemoveMap(map->key);
   state_.Retarget(map->key, command.name, 0, "");
   memory_.PinMapsInUse();

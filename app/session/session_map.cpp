@@ -5,6 +5,18 @@
 
 namespace docent::app {
 
+void SessionMap::Discard() {
+  discarded = true;
+  saved_snapshot.reset();
+  mesh.reset();
+  light.reset();
+  if (!snapshot) return;
+  static const auto no_image = std::make_shared<const engine::ImageFeatures>();
+  auto numbers = std::make_shared<engine::MapSnapshot>(*snapshot);
+  for (engine::KeyFrame& keyframe : numbers->keyframes) keyframe.features = no_image;
+  snapshot = std::move(numbers);
+}
+
 void SessionMap::UpdateSnapshot(std::shared_ptr<const engine::MapSnapshot> newer) {
   const auto before = std::exchange(snapshot, std::move(newer));
   SetMesh(std::move(mesh), std::move(light));

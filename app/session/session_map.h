@@ -69,6 +69,9 @@ struct SessionMap {
   // What the system may do with the map, from its policy and from what happened to it.
   engine::MapPermissions Permissions() const;
 
+  // The map ends. Reports count what it contained, so its numbers are kept; its images, which need most of
+  // its memory, and its surfaces are not.
+  void Discard();
   // False once the map was discarded or joined into another one.
   bool Exists() const { return !discarded && joined_into == 0; }
   bool NeedsSave() const { return snapshot && (snapshot != saved_snapshot || scene != saved_scene); }

@@ -53,14 +53,6 @@ bool LeadsTo(const content::Signpost& signpost, const maps::MapInfo& map) {
   return maps::LeadsTo({signpost.to_key, signpost.to_map}, map);
 }
 
-// The numbers of a map, without its images, which need most of its memory.
-std::shared_ptr<const engine::MapSnapshot> WithoutImages(const engine::MapSnapshot& map) {
-  static const auto no_image = std::make_shared<const engine::ImageFeatures>();
-  auto numbers = std::make_shared<engine::MapSnapshot>(map);
-  for (engine::KeyFrame& keyframe : numbers->keyframes) keyframe.features = no_image;
-  return numbers;
-}
-
 std::string TextOf(const engine::CalibrationMonitor::Mismatch& mismatch) {
   const auto radius = [](double px) { return std::to_string(std::lround(px)); };
   const auto pixels = [](double px) { return FormatNumber(std::round(10 * px) / 10, 3); };
@@ -127,9 +119,7 @@ void SystemEventHandler::Handle(const engine::SystemEvent& event, const engine::
   SessionMap* const found = state_.FindMap(event.map);
   if (found == nullptr) return;
   SessionMap& map = *found;
-  map.discarded = true;
-  // Reports count what discarded maps contained.
-  if (map.snapshot) map.snapshot = WithoutImages(*map.snapshot);
+  map.Discard();
   state_.AddEvent(event.time, "map",
                   "discarded " + map.name + ": " + ReasonOf(what, state_.NameOf(what.other)));
   if (what.replacement == 0) return;

@@ -3,6 +3,9 @@
 
 #include <gtest/gtest.h>
 
+#include <memory>
+#include <utility>
+
 #include "content/edits.h"
 #include "engine/base/error.h"
 
@@ -40,6 +43,19 @@ TEST(SessionState, FreesTheNameOfAMapThatWasDiscarded) {
   EXPECT_EQ(state.FreeMapName("Hall"), "Hall 2");
   EXPECT_EQ(state.FindByName("Hall 2"), nullptr);
   EXPECT_EQ(state.NameOf(1), "Hall 2");  // what was said about it still has a name
+}
+
+TEST(SessionState, KeepsTheNumbersOfADiscardedMapAndNotItsImages) {
+  SessionMap map;
+  auto image = std::make_shared<const engine::ImageFeatures>();
+  const std::weak_ptr<const engine::ImageFeatures> watched = image;
+  auto snapshot = std::make_shared<engine::MapSnapshot>();
+  snapshot->keyframes.emplace_back().features = std::move(image);
+  map.snapshot = map.saved_snapshot = std::move(snapshot);
+  map.Discard();
+  EXPECT_FALSE(map.Exists());
+  EXPECT_EQ(map.snapshot->keyframes.size(), 1u);
+  EXPECT_TRUE(watched.expired());
 }
 
 TEST(SessionState, KeepsTheNameOfAMapThatWasJoined) {
