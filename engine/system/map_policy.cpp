@@ -230,7 +230,7 @@ void MapPolicy::AssignMapper(std::uint64_t key, std::shared_ptr<const MapSnapsho
   SearchInitialViewsAgain();
   state_.active_key = key;
   joins_.Cancel();
-  mapping_.Adopt(key, std::move(snapshot));
+  state_.adoption = mapping_.Adopt(key, std::move(snapshot));
 }
 
 // The mapper drops what it was given for the active map, and says nothing of the initial views among it, so

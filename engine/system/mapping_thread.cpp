@@ -33,6 +33,7 @@ MappingThread::MappingThread(const MapperOptions& options, bool threaded, Update
 void MappingThread::ReportFailure() {
   MapperUpdate update;
   update.key = key_;
+  update.adoption = adoption_number_;
   try {
     throw;
   } catch (const std::exception& error) {
@@ -43,11 +44,13 @@ void MappingThread::ReportFailure() {
   on_update_(update);
 }
 
-void MappingThread::Adopt(std::uint64_t key, std::shared_ptr<const MapSnapshot> snapshot) {
+std::uint64_t MappingThread::Adopt(std::uint64_t key, std::shared_ptr<const MapSnapshot> snapshot) {
+  std::uint64_t number = 0;
   {
     const std::scoped_lock lock(mutex_);
     requested_key_ = key;
-    adoption_ = Adoption{key, std::move(snapshot)};
+    number = ++adoptions_;
+    adoption_ = Adoption{number, key, std::move(snapshot)};
     pair_.reset();
     join_.reset();
     interrupt_join_ = true;
@@ -56,6 +59,7 @@ void MappingThread::Adopt(std::uint64_t key, std::shared_ptr<const MapSnapshot> 
   }
   changed_.notify_all();
   if (!worker_) ApplyAdoption();
+  return number;
 }
 
 bool MappingThread::Start(std::uint64_t key, InitialPair pair) {
@@ -111,9 +115,10 @@ void MappingThread::ApplyAdoption() {
     mapper_.Adopt(adoption.snapshot);
     mapper_.TakeEvents();  // discards events of the previous map
     key_ = adoption.key;
+    adoption_number_ = adoption.number;
     last_snapshot_ = adoption.snapshot;
     lock.lock();
-    if (adoption_->key == adoption.key && adoption_->snapshot == adoption.snapshot) adoption_.reset();
+    if (adoption_->number == adoption.number) adoption_.reset();
   }
   if (!pair_) return;
   if (mapper_.Start(*pair_)) {
@@ -133,6 +138,7 @@ void MappingThread::JoinIfRequested() {
   }
   MapperUpdate update;
   update.key = key_;
+  update.adoption = adoption_number_;
   update.join = MapperUpdate::Join{request->number, mapper_.Join(*request->other, &interrupt_join_)};
   request.reset();
   if (update.join->attempt.joined) update.snapshot = last_snapshot_ = mapper_.Snapshot();
@@ -143,6 +149,7 @@ bool MappingThread::StepOnce() {
   const bool worked = mapper_.Step();
   MapperUpdate update;
   update.key = key_;
+  update.adoption = adoption_number_;
   update.events = mapper_.TakeEvents();
   for (const MapperEvent& event : update.events) {
     if (std::holds_alternative<MapperEvent::LensesEstimated>(event.what)) update.lenses = mapper_.Lenses();

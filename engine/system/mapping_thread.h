@@ -29,6 +29,7 @@ class MappingThread {
  public:
   struct MapperUpdate {
     std::uint64_t key = 0;
+    std::uint64_t adoption = 0;  // number of the Adopt after which it was computed; 0 for none
     std::shared_ptr<const MapSnapshot> snapshot;  // null when nothing new was published
     std::vector<MapperEvent> events;
     // All estimated lenses if one of the events is LensesEstimated, else empty. `snapshot` uses them.
@@ -46,7 +47,9 @@ class MappingThread {
   MappingThread(const MapperOptions& options, bool threaded, UpdateCallback on_update);
 
   // Continues with this map; pending requests for another one are dropped. A null snapshot waits for Start.
-  void Adopt(std::uint64_t key, std::shared_ptr<const MapSnapshot> snapshot);
+  // Returns the number of the adoption, from 1: updates with a smaller one are of the map before, which may
+  // have the same key.
+  std::uint64_t Adopt(std::uint64_t key, std::shared_ptr<const MapSnapshot> snapshot);
   // Initializes the map of `key` from its first two views; false when another map was adopted since. The pair
   // waits while the queue of keyframes is full.
   bool Start(std::uint64_t key, InitialPair pair);
@@ -74,6 +77,7 @@ class MappingThread {
  private:
   static constexpr int kMaxSteps = 20;
   struct Adoption {
+    std::uint64_t number = 0;
     std::uint64_t key = 0;
     std::shared_ptr<const MapSnapshot> snapshot;
   };
@@ -94,11 +98,13 @@ class MappingThread {
   const UpdateCallback on_update_;
   // Accessed only by the thread that runs the mapper.
   std::uint64_t key_ = 0;
+  std::uint64_t adoption_number_ = 0;
   std::shared_ptr<const MapSnapshot> last_snapshot_;
 
   mutable std::mutex mutex_;  // guards the members below; never held during a step
   std::condition_variable_any changed_;
   std::uint64_t requested_key_ = 0;
+  std::uint64_t adoptions_ = 0;
   std::optional<Adoption> adoption_;
   std::optional<InitialPair> pair_;
   std::optional<JoinRequest> join_;

@@ -186,9 +186,9 @@ void System::OnMapperUpdate(const MappingThread::MapperUpdate& update) {
     if (!update.lenses.empty()) calibrations_.SetLenses(update.lenses, update.events.back().time);
     if (!update.failure.empty()) state_.Emit(state_.LastTime(), update.key, MapperFailed{update.failure});
     const auto found = state_.maps.find(update.key);
-    // A late update of a map that was closed or discarded meanwhile is ignored.
-    const bool late =
-        found == state_.maps.end() || update.key != state_.active_key || !found->second.Exists();
+    // A late update of a map that was closed, discarded or adopted anew meanwhile is ignored.
+    const bool late = found == state_.maps.end() || update.key != state_.active_key ||
+                      update.adoption != state_.adoption || !found->second.Exists();
     if (!late && (!update.join || IsAwaited(*update.join, found->second))) {
       KnownMap& map = found->second;
       if (update.snapshot) {

@@ -98,6 +98,7 @@ struct SystemState {
   CameraAssociation association;
   CameraRig rig;
   std::uint64_t active_key = 0;  // the map that the mapper works on; 0 for none
+  std::uint64_t adoption = 0;    // the mapper's number for having adopted it last
   OdometryCopy copy;
   std::vector<EstimatedLens> lenses;  // of cameras with an unknown calibration
   std::vector<SystemEvent> events;

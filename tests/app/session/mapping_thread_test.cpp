@@ -41,7 +41,7 @@ engine::KeyFrameCandidate FirstKeyFrame() {
 class HeldMapper : public ::testing::Test {
  protected:
   HeldMapper() {
-    mapping_.Adopt(1, nullptr);
+    adoption_ = mapping_.Adopt(1, nullptr);
     mapping_.WaitUntilIdle(steady_clock::now() + hours(1), {});
     EXPECT_TRUE(mapping_.IsIdle());
     EXPECT_TRUE(mapping_.Offer(1, FirstKeyFrame(), {}));
@@ -55,10 +55,12 @@ class HeldMapper : public ::testing::Test {
     release_.set_value();
   }
 
+  std::uint64_t adoption_ = 0, held_adoption_ = 0;
   std::promise<void> first_update_, release_;
   std::atomic<bool> released_ = false;
-  engine::MappingThread mapping_{{}, true, [this](const engine::MappingThread::MapperUpdate&) {
+  engine::MappingThread mapping_{{}, true, [this](const engine::MappingThread::MapperUpdate& update) {
                                    if (released_) return;
+                                   held_adoption_ = update.adoption;
                                    first_update_.set_value();
                                    release_.get_future().wait();
                                  }};
@@ -87,6 +89,11 @@ TEST_F(HeldMapper, DelaysASourceBeyondTheGivenTimeWhenAKeyFrameBehind) {
   mapping_.WaitUntilIdle(steady_clock::now(), {});
   EXPECT_TRUE(released_);
   later.join();
+}
+
+TEST_F(HeldMapper, TellsUpdatesFromThoseBeforeTheSameMapWasAdoptedAgain) {
+  EXPECT_EQ(held_adoption_, adoption_);
+  EXPECT_GT(mapping_.Adopt(1, nullptr), held_adoption_);
 }
 
 TEST_F(HeldMapper, EndsTheDelayWhenStopIsRequested) {
