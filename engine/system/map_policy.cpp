@@ -78,6 +78,7 @@ void MapPolicy::LeavePreviousMap(std::uint64_t previous, std::uint64_t entered, 
     left.join_with = entered;
     return;
   }
+  if (!left.permissions.discard) return;
   left.Discard();
   index_.RemoveMap(previous);
   MapDiscarded event;

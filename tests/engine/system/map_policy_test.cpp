@@ -201,6 +201,20 @@ TEST_F(PolicyForTwoCameras, KeepsNoSnapshotOfADiscardedMap) {
   EXPECT_TRUE(MapOf(1).snapshot);
 }
 
+TEST_F(PolicyForTwoCameras, KeepsAMapThatMayNotBeDiscardedWhenTheCameraIsFoundInAnother) {
+  options_.new_map_when_lost = true;
+  LoseMapWithAPoint(2);
+  Lose(0, 2.25);
+  for (const std::size_t camera : {0, 1}) NextOrder(camera);
+  MapOf(2).SetSnapshot(MapWithoutDepth());
+  MapOf(2).permissions.discard = false;
+  Handle(0, 2.3, TrackingState::kPanorama, 2);
+  Handle(0, 2.4, TrackingState::kRelocalized, 1);
+  EXPECT_EQ(Assignment(0).map(), 1u);
+  EXPECT_TRUE(MapOf(2).Exists());
+  EXPECT_TRUE(MapOf(2).snapshot);
+}
+
 TEST_F(PolicyForTwoCameras, KeepsNoSnapshotOfAMapThatWasJoinedIntoAnother) {
   LoseMapWithAPoint(2);
   state_.AddMap(2).SetSnapshot(MapWithAPoint());
