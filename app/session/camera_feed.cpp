@@ -113,6 +113,7 @@ void CameraFeed::CarryOutGiven() {
 }
 
 void CameraFeed::ContinueDisconnected() {
+  session_->Disconnect(static_cast<std::size_t>(run_.options.camera));
   CarryOutGiven();
   if (last_tracked_) session_->Idle(std::max(frame_.time, last_tracked_->frame.time));
   if (run_.options.disconnected) run_.options.disconnected(last_tracked_ ? &*last_tracked_ : nullptr);

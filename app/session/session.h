@@ -58,6 +58,8 @@ class Session {
   // Does what is due while no images come, for instance because a recording is paused: applies what the
   // mapper has done meanwhile, and saves. `time` is that of the last image and what has passed since then.
   void Idle(Timestamp time);
+  // The camera delivers no images until the next Process with one of them (see engine::System::Disconnect).
+  void Disconnect(std::size_t camera) { system_.Disconnect(camera); }
   // Details of the frame that Process returned last as `frame`; on the thread of its camera.
   engine::FrameInspection Inspect(const engine::TrackedFrame& frame) const { return system_.Inspect(frame); }
   // Delays a source that delivers faster than a camera; see engine::System::WaitUntilIdle.

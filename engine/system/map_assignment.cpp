@@ -29,14 +29,6 @@ void MapAssignment::Leave() {
   order_ = Order::kLeave;
 }
 
-void MapAssignment::Replace(std::uint64_t map, bool after_loss) {
-  if (started_map_) {
-    Start(map, after_loss);
-  } else {
-    Enter(map);
-  }
-}
-
 void MapAssignment::SearchAgain() {
   if (order_ == Order::kNone) order_ = Order::kEnter;
 }

@@ -30,8 +30,6 @@ class MapAssignment {
   void Enter(std::uint64_t map);
   // It searches all maps.
   void Leave();
-  // Its map was discarded, and this one is started instead by the camera that started the first.
-  void Replace(std::uint64_t map, bool after_loss);
   // Its tracker entered this map by itself.
   void Follow(std::uint64_t map) { map_ = map; }
   // Its pose was refused: it searches the map unless something else was ordered.

@@ -136,18 +136,18 @@ void MapPolicy::Discard(std::size_t index, Timestamp time, MapDiscarded event) {
   state_.Emit(time, key, event);
   AssignMapper(next.key, nullptr);
   state_.association.Begin(next.key);
-  // Until the next map has a pose, no camera may search another one: one of them must start it.
-  const bool has_starter =
-      std::any_of(state_.cameras.begin(), state_.cameras.end(), [key](const SystemCamera& camera) {
-        return camera.assignment.map() == key && camera.assignment.started_map();
-      });
+  // Until the next map has a pose, no camera may search another one: a camera with images must start it.
+  const auto is_starter = [key](const SystemCamera& camera) {
+    return camera.is_connected && camera.assignment.map() == key && camera.assignment.started_map();
+  };
+  const bool has_starter = std::any_of(state_.cameras.begin(), state_.cameras.end(), is_starter);
   for (std::size_t i = 0; i < state_.cameras.size(); ++i) {
     MapAssignment& assignment = state_.cameras[i].assignment;
     if (assignment.map() != key) continue;
-    if (i == index && !has_starter) {
+    if (has_starter ? is_starter(state_.cameras[i]) : i == index) {
       assignment.Start(next.key, next.after_loss);
     } else {
-      assignment.Replace(next.key, next.after_loss);
+      assignment.WaitFor(next.key);
     }
   }
 }

@@ -67,6 +67,12 @@ TrackedFrame System::Process(const Frame& frame) {
   return tracked;
 }
 
+void System::Disconnect(std::size_t camera) {
+  const std::scoped_lock lock(mutex_);
+  state_.cameras.at(camera).is_connected = false;
+  state_.association.SetLost(camera);
+}
+
 CameraPlaceFinder System::ApplyOrder(std::size_t index, Timestamp time) {
   using Order = MapAssignment::Order;
   SystemCamera* const camera = &state_.cameras[index];
@@ -79,6 +85,7 @@ CameraPlaceFinder System::ApplyOrder(std::size_t index, Timestamp time) {
   auto order = Order::kNone;
   {
     const std::scoped_lock lock(mutex_);
+    camera->is_connected = true;
     model = camera->model;
     if (const auto found = state_.maps.find(camera->assignment.map()); found != state_.maps.end()) {
       snapshot = found->second.snapshot;

@@ -51,6 +51,9 @@ class System {
 
   // Tracks one image, and offers it to the mapper.
   TrackedFrame Process(const Frame& frame);
+  // The camera delivers no images until the next Process with one of them. It counts as lost meanwhile, so
+  // that the other cameras may search every map and start new ones. On the thread of its camera.
+  void Disconnect(std::size_t camera);
   // Details of the frame that Process returned last as `frame`; on the thread of its camera.
   FrameInspection Inspect(const TrackedFrame& frame) const;
   // Delays a source that delivers faster than a camera; see MappingThread::WaitUntilIdle.

@@ -28,6 +28,7 @@ struct SystemCamera {
   std::unique_ptr<CalibrationMonitor> calibration_monitor;
   MapAssignment assignment;
   Timestamp last_time{};
+  bool is_connected = true;  // delivers images
 };
 
 // A map that the system knows.

@@ -2,6 +2,7 @@
 // Tests of the maps that an application adds to a System and removes from it.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <memory>
 #include <utility>
 #include <variant>
@@ -52,6 +53,38 @@ TEST_F(KnownMaps, AreFreedWhenTheyAreRemoved) {
   const std::weak_ptr<const MapSnapshot> loaded_late = late;
   system_.SetSnapshot(1, std::move(late));
   EXPECT_TRUE(loaded_late.expired());
+}
+
+TEST(DisconnectedCamera, LetsTheOtherCameraStartAMap) {
+  SystemOptions options;
+  options.threaded = false;
+  options.new_map_when_lost = true;
+  System system(options, {Camera(), Camera()});
+  const auto map = testing_world::TrueMap(testing_world::World(), Camera(),
+                                          {CameraAt({-0.1, 0, 0}), CameraAt({0.1, 0, 0})})
+                       .Snapshot();
+  system.AddMap(1, map, MapPermissions());
+  system.place_index().SetMap(1, map);
+  system.EnterMap(1, 0);
+  int image = 0;
+  TrackedFrame tracked;
+  for (; image < 5; ++image)
+    tracked = system.Process(testing_world::MakeFrame(image, testing_world::World(), CameraAt({0, 0, 0})));
+  ASSERT_TRUE(HasPose(tracked.state));
+  const auto starts_a_map = [&] {
+    for (const int last = image + 30; image < last; ++image) {
+      Frame dark = testing_world::MakeFrame(image, cv::Mat::zeros(480, 640, CV_8UC1));
+      dark.camera = 1;
+      system.Process(dark);
+    }
+    const auto events = system.TakeEvents();
+    return std::any_of(events.begin(), events.end(), [](const SystemEvent& event) {
+      return std::holds_alternative<MapStartedAfterLoss>(event.what);
+    });
+  };
+  EXPECT_FALSE(starts_a_map()) << "the first camera is tracked";
+  system.Disconnect(0);
+  EXPECT_TRUE(starts_a_map());
 }
 
 }  // namespace

@@ -55,20 +55,6 @@ TEST(MapAssignment, StopsStartingWhenTheCameraLeavesOrEnters) {
   }
 }
 
-TEST(MapAssignment, StartsTheReplacementByTheCameraThatStartedTheDiscardedMap) {
-  MapAssignment starter, other;
-  starter.Start(3, true);
-  other.WaitFor(3);
-  starter.Replace(4, true);
-  other.Replace(4, true);
-  EXPECT_EQ(starter.TakeOrder(kNoDepth), Order::kStartAfterLoss);
-  EXPECT_EQ(other.TakeOrder(kNoDepth), Order::kEnter);
-  other.Start(5, false);
-  starter.WaitFor(5);
-  starter.Replace(6, false);
-  EXPECT_EQ(starter.TakeOrder(kNoDepth), Order::kEnter);
-}
-
 TEST(MapAssignment, StartsAgainAfterAFailureOnlyWhileItIsStarting) {
   MapAssignment assignment;
   assignment.Enter(3);

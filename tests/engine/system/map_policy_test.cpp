@@ -88,6 +88,18 @@ TEST_F(PolicyForTwoCameras, ReplacesAMapWithoutDepthThatACameraStarted) {
   EXPECT_EQ(NextOrder(1), Order::kStart);
 }
 
+TEST_F(PolicyForTwoCameras, LetsTheLostCameraStartAReplacementOfTheMapOfADisconnectedCamera) {
+  policy_.StartMap(1, 0, false);
+  for (const std::size_t camera : {0, 1}) NextOrder(camera);
+  MapOf(1).SetSnapshot(MapWithoutDepth());
+  state_.cameras[0].is_connected = false;
+  Lose(1, 2);
+  Lose(1, 2.2);
+  EXPECT_TRUE(MapOf(1).discarded);
+  EXPECT_EQ(NextOrder(0), Order::kEnter);
+  EXPECT_EQ(NextOrder(1), Order::kStart);
+}
+
 TEST_F(PolicyForTwoCameras, KeepsAMapWithoutDepthThatNoCameraStarted) {
   EnterMapWithoutDepth(1);
   for (const double seconds : {2.0, 2.2, 9.0}) Lose(0, seconds);
