@@ -2,6 +2,7 @@
 #include "content/scene_merge.h"
 
 #include <algorithm>
+#include <map>
 
 #include "content/entity_codec.h"
 
@@ -19,6 +20,68 @@ std::string StoredForm(Entity entity) {
 bool IsSame(const Entity* a, const Entity* b) {
   if (a == nullptr || b == nullptr) return a == b;
   return StoredForm(*a) == StoredForm(*b);
+}
+
+bool HasGroup(const Scene& scene, const std::string& group) {
+  return std::any_of(scene.entities.begin(), scene.entities.end(),
+                     [&](const Entity& entity) { return entity.group == group; });
+}
+
+std::string FormWithoutGroup(Entity entity) {
+  entity.group.clear();
+  return StoredForm(std::move(entity));
+}
+
+// The groups of theirs that are not in the base.
+class NewGroups {
+ public:
+  NewGroups(const Scene& base, const Scene& theirs) : base_(base) {
+    for (const Entity& their : theirs.entities) {
+      if (!IsNew(their.group)) continue;
+      if (base.Find(their.name) != nullptr) {
+        by_name_.emplace(their.name, their.group);
+      } else {
+        by_form_.emplace(FormWithoutGroup(their), their.group);
+      }
+    }
+  }
+  bool IsNew(const std::string& group) const { return !group.empty() && !HasGroup(base_, group); }
+  // Their new group of an entity of mine; null if they have put it into none. One that the base does not have
+  // may have got another name in an earlier merge.
+  const std::string* Find(const Entity& my) const {
+    if (const auto found = by_name_.find(my.name); found != by_name_.end()) return &found->second;
+    const auto found = by_form_.find(FormWithoutGroup(my));
+    return found == by_form_.end() ? nullptr : &found->second;
+  }
+
+ private:
+  const Scene& base_;
+  std::map<std::string, std::string> by_name_, by_form_;
+};
+
+// My scene, in which a new group has the name of a group of theirs only if both sides have put the same
+// entity into it: authors who do not know of each other choose the same names for their groups.
+Scene WithGroupsApart(const Scene& base, Scene mine, const Scene& theirs) {
+  const NewGroups new_groups(base, theirs);
+  std::map<std::string, std::string> names;  // By the name that I have given.
+  for (const Entity& my : mine.entities) {
+    if (!new_groups.IsNew(my.group) || names.contains(my.group)) continue;
+    if (const std::string* const their = new_groups.Find(my)) names[my.group] = *their;
+  }
+  const auto is_taken = [&](const std::string& name) {
+    return HasGroup(base, name) || HasGroup(mine, name) || HasGroup(theirs, name) ||
+           std::any_of(names.begin(), names.end(), [&](const auto& given) { return given.second == name; });
+  };
+  for (const Entity& my : mine.entities) {
+    if (!new_groups.IsNew(my.group) || names.contains(my.group) || !HasGroup(theirs, my.group)) continue;
+    int number = 2;
+    while (is_taken(my.group + "-" + std::to_string(number))) ++number;
+    names[my.group] = my.group + "-" + std::to_string(number);
+  }
+  for (Entity& my : mine.entities) {
+    if (const auto name = names.find(my.group); name != names.end()) my.group = name->second;
+  }
+  return mine;
 }
 
 // Adds my version of an entity that both sides have changed, unless an equal one is there: an earlier merge
@@ -50,12 +113,13 @@ MapSettings MergeSettings(const MapSettings& base, const MapSettings& mine, cons
 }  // namespace
 
 SceneMerge MergeScenes(const Scene& base, const Scene& mine, const Scene& theirs) {
+  const Scene grouped = WithGroupsApart(base, mine, theirs);
   SceneMerge merge;
   merge.scene.settings = MergeSettings(base.settings, mine.settings, theirs.settings, &merge.conflicts);
   std::vector<const Entity*> in_conflict;
   for (const Entity& their : theirs.entities) {
     const Entity* const before = base.Find(their.name);
-    const Entity* const my = mine.Find(their.name);
+    const Entity* const my = grouped.Find(their.name);
     if (IsSame(&their, before)) {
       // Nobody but me may have changed it; if I removed it, it is gone.
       if (my != nullptr) merge.scene.entities.push_back(*my);
@@ -64,7 +128,7 @@ SceneMerge MergeScenes(const Scene& base, const Scene& mine, const Scene& theirs
     merge.scene.entities.push_back(their);
     if (my != nullptr && !IsSame(my, before) && !IsSame(my, &their)) in_conflict.push_back(my);
   }
-  for (const Entity& my : mine.entities) {
+  for (const Entity& my : grouped.entities) {
     if (theirs.Find(my.name) == nullptr && !IsSame(&my, base.Find(my.name)))
       merge.scene.entities.push_back(my);
   }
