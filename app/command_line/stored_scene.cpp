@@ -96,7 +96,9 @@ void EditStoredScene(maps::Library* library, const maps::MapInfo& map, std::span
   record.policy = map.policy;
   record.scene = std::make_shared<const maps::SceneRecord>(RecordFromScene(scene));
   record.history = std::make_shared<const maps::SceneRecord>(RecordFromHistory(history, scene));
-  library->Save(record);
+  record.expected = map;
+  if (!library->Save(record))
+    throw Error(where + ": it was changed by another program meanwhile, and nothing was saved; try again.");
   Warn(problems);
 }
 

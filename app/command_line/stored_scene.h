@@ -23,7 +23,8 @@ using MakeEdit = std::function<content::SceneChange(const content::Scene&)>;
 
 // Applies edits to the stored scene of a map, one after the other, and saves it once. Together they are one
 // change, which a session can undo, as it can undo those before. Nothing changes when an edit does not fit,
-// or the policy of the map forbids it. If content is damaged, only this change can be undone.
+// the policy of the map forbids it, or another program has changed the map since `map` was read, so that its
+// work is kept. If content is damaged, only this change can be undone.
 void EditStoredScene(maps::Library* library, const maps::MapInfo& map, std::span<const MakeEdit> edits);
 
 }  // namespace docent::app
