@@ -33,12 +33,24 @@ maps::AssetRecord RecordOf(const std::shared_ptr<const content::Asset>& asset) {
 }
 
 // Encoding writes only the ids of assets, so their bytes are not needed.
+std::shared_ptr<const content::Asset> AssetWithoutBytes(const std::string& id) {
+  auto asset = std::make_shared<content::Asset>();
+  asset->id = id;
+  return asset;
+}
+
 content::Scene SceneWithoutModels(const std::string& text) {
-  return content::DecodeScene(text, "its content", [](const std::string& id) {
-    auto asset = std::make_shared<content::Asset>();
-    asset->id = id;
-    return asset;
-  });
+  return content::DecodeScene(text, "its content", AssetWithoutBytes);
+}
+
+// Returns whether the signpost leads elsewhere now.
+bool RetargetSignpost(const std::string& name, const maps::Retarget& retarget, content::Signpost* signpost) {
+  const auto target = retarget(name, {signpost->to_key, signpost->to_map});
+  if (!target) return false;
+  signpost->to_key = target->key;
+  signpost->to_map = target->map;
+  if (*target == maps::SignpostTarget()) content::LeadNowhere(signpost);
+  return true;
 }
 
 std::optional<std::string> RetargetScene(const std::string& text, const maps::Retarget& retarget) {
@@ -47,14 +59,16 @@ std::optional<std::string> RetargetScene(const std::string& text, const maps::Re
   bool changed = false;
   for (content::Entity& entity : scene.entities) {
     if (entity.kind != content::Entity::Kind::kSignpost) continue;
-    const auto target = retarget(entity.name, {entity.signpost.to_key, entity.signpost.to_map});
-    if (!target) continue;
-    entity.signpost.to_key = target->key;
-    entity.signpost.to_map = target->map;
-    if (*target == maps::SignpostTarget()) content::LeadNowhere(&entity.signpost);
-    changed = true;
+    changed = RetargetSignpost(entity.name, retarget, &entity.signpost) || changed;
   }
   return changed ? std::optional(content::EncodeScene(scene)) : std::nullopt;
+}
+
+std::optional<std::string> RetargetHistory(const std::string& text, const maps::Retarget& retarget) {
+  content::EditHistory history = content::DecodeHistory(text, "its undo history", AssetWithoutBytes);
+  const bool changed = history.RetargetSignposts(
+      [&](content::Signpost* signpost) { return RetargetSignpost("", retarget, signpost); });
+  return changed ? std::optional(content::EncodeHistory(history, maps::kMaxHistoryTextBytes)) : std::nullopt;
 }
 
 maps::SceneRecord ReadScene(const maps::SceneRecord& record, std::vector<std::string>* problems) {
@@ -154,7 +168,7 @@ content::EditHistory HistoryFromRecord(const maps::SceneRecord& record, const st
 }
 
 maps::SceneTools LibrarySceneTools() {
-  return {ReadScene, RetargetScene};
+  return {ReadScene, RetargetScene, RetargetHistory};
 }
 
 maps::MergeScenes LibrarySceneMerger() {

@@ -96,6 +96,27 @@ std::optional<SceneRecord> ReadSceneHistory(const Database& database, std::uint6
   return history;
 }
 
+std::optional<std::string> FindHistoryText(const Database& database, std::uint64_t key) {
+  try {
+    const std::optional<HistoryPart> part = ReadHistory(database, key);
+    if (part && part->scene == SceneChecksum(database, key)) return part->changes.text;
+  } catch (const Error&) {
+    return std::nullopt;  // Verify reports it.
+  }
+  return std::nullopt;
+}
+
+void WriteHistoryText(const Database& database, std::uint64_t key, const std::string& text) {
+  if (text.empty()) {
+    RemoveHistory(database, key);
+    RemoveUnusedAssets(database);
+    return;
+  }
+  HistoryPart history = ReadHistory(database, key).value();
+  history.changes.text = text;
+  WriteHistory(database, key, history);
+}
+
 void WriteSceneHistory(const Database& database, std::uint64_t key, const SceneRecord& history) {
   const std::vector<std::string> of_scene = ReadScenePart(database, key).asset_ids;
   std::size_t bytes = 0;

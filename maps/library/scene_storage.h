@@ -29,6 +29,10 @@ bool UpdateScene(const Database& database, const SceneRecord& scene, const MapIn
 std::optional<SceneRecord> ReadSceneHistory(const Database& database, std::uint64_t key);
 // Throws if assets that the scene does not use are larger than kMaxHistoryAssetBytes together.
 void WriteSceneHistory(const Database& database, std::uint64_t key, const SceneRecord& history);
+// The text of the history of the scene as it is; empty if there is none, or a damaged one.
+std::optional<std::string> FindHistoryText(const Database& database, std::uint64_t key);
+// Replaces the text of the stored history only; an empty one removes the history.
+void WriteHistoryText(const Database& database, std::uint64_t key, const std::string& text);
 // As UpdateScene; a history with an empty text removes the stored one.
 bool UpdateSceneHistory(const Database& database, const SceneRecord& history, const MapInfo& info);
 

@@ -22,18 +22,33 @@ std::optional<std::string> SignpostRedirection::RetargetIn(const MapInfo& info,
   }
 }
 
+std::optional<std::string> SignpostRedirection::RetargetInHistory(const MapInfo& info,
+                                                                  const Retarget& retarget) const {
+  if (!scenes_.retarget_history) return std::nullopt;
+  try {
+    const std::optional<std::string> text = FindHistoryText(database_, info.key);
+    return text ? scenes_.retarget_history(*text, retarget) : std::nullopt;
+  } catch (const Error&) {
+    return std::nullopt;
+  }
+}
+
 void SignpostRedirection::Redirect(const MapInfo& from, const SignpostTarget& into,
                                    const std::vector<std::uint64_t>& except,
                                    const std::string& refusal) const {
   for (MapInfo info : ReadMapRows(database_)) {
     if (std::find(except.begin(), except.end(), info.key) != except.end()) continue;
-    const auto text = RetargetIn(info, [&](const std::string&, const SignpostTarget& target) {
+    const auto retarget = [&](const std::string&, const SignpostTarget& target) {
       return LeadsTo(target, from) && target != into ? std::optional(into) : std::nullopt;
-    });
-    if (!text) continue;
+    };
+    // Before the scene is written, to which the history belongs.
+    const std::optional<std::string> history = RetargetInHistory(info, retarget);
+    const std::optional<std::string> text = RetargetIn(info, retarget);
+    if (!text && !history) continue;
     WithMapContext(database_, info, [&] {
-      if (!refusal.empty() && !MayChangeContent(info.policy)) Refuse(info.policy, refusal);
-      WriteSceneText(database_, info.key, *text);
+      if (text && !refusal.empty() && !MayChangeContent(info.policy)) Refuse(info.policy, refusal);
+      if (text) WriteSceneText(database_, info.key, *text);
+      if (history) WriteHistoryText(database_, info.key, *history);
     });
     info.modified = clock_();
     WriteMapRow(database_, info);

@@ -25,13 +25,17 @@ class SignpostRedirection {
   // The text of a map's scene with other targets; empty if none changes, or the scene cannot be read and so
   // leads nowhere.
   std::optional<std::string> RetargetIn(const MapInfo& info, const Retarget& retarget) const;
-  // Makes all signposts to the map `from` lead to another map or, with an empty target, nowhere. The maps
-  // with the keys `except` are left out. `refusal` says what cannot be done where the policy forbids it; if
-  // it is empty, the policy does not matter, because the signposts lead to the same place as before.
+  // Makes all signposts to the map `from` lead to another map or, with an empty target, nowhere; also those
+  // that undo and redo would restore. The maps with the keys `except` are left out. `refusal` says what
+  // cannot be done where the policy forbids it; if it is empty, the policy does not matter, because the
+  // signposts lead to the same place as before. It never matters for what undo would restore.
   void Redirect(const MapInfo& from, const SignpostTarget& into, const std::vector<std::uint64_t>& except,
                 const std::string& refusal) const;
 
  private:
+  // The same for what the changes of the scene that can be undone restore.
+  std::optional<std::string> RetargetInHistory(const MapInfo& info, const Retarget& retarget) const;
+
   const Database& database_;
   const SceneTools& scenes_;
   const std::function<WallTime()>& clock_;

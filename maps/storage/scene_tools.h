@@ -36,6 +36,11 @@ struct SceneTools {
   // Applies `retarget` to all signposts of a scene; returns the new text, empty if it stays the same. Throws
   // docent::Error when the text cannot be read.
   std::function<std::optional<std::string>(const std::string& text, const Retarget& retarget)> retarget;
+  // The same for the signposts in a history of changes (MapRecord::history); `retarget` is not told their
+  // names. The new text has at most kMaxHistoryTextBytes: the oldest changes are left out if it would have
+  // more, and nothing may be left.
+  std::function<std::optional<std::string>(const std::string& text, const Retarget& retarget)>
+      retarget_history;
 };
 
 }  // namespace docent::maps

@@ -237,6 +237,7 @@ SceneTools SampleSceneTools() {
     }
     return changed == text ? std::nullopt : std::optional(changed);
   };
+  tools.retarget_history = tools.retarget;
   return tools;
 }
 

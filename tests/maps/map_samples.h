@@ -35,7 +35,7 @@ AssetRecord MakeSampleAsset(std::uint64_t seed, std::size_t bytes);
 std::shared_ptr<SceneRecord> MakeSampleScene(std::uint64_t seed, int assets);
 
 // Functions for scenes with one entity per line: "sign NAME KEY MAP" is a signpost, "model ID" needs an
-// asset, and "damaged" is not readable; other lines are left as they are.
+// asset, and "damaged" is not readable; other lines are left as they are. Histories have the same form.
 SceneTools SampleSceneTools();
 std::shared_ptr<SceneRecord> MakeTextScene(std::string text);
 

@@ -97,6 +97,41 @@ TEST_F(UndoAcrossSessions, IsLostAloneWhenTheHistoryIsDamaged) {
   EXPECT_THAT(warnings_, Contains(HasSubstr("earlier changes cannot be undone")));
 }
 
+TEST(StoredHistories, RestoreNoSignpostToAMapThatIsGoneOrHasAnotherName) {
+  const TemporaryFolder folder;
+  maps::Library library =
+      OpenLibrary(folder / "l.docent", maps::Access::kReadWrite, maps::CreateIfMissing::kYes);
+  for (const char* name : {"Hall", "Tower", "Yard"})
+    library.Save({library.NewKey(), name, maps::Policy::kOpen, nullptr, nullptr});
+  content::Scene scene;
+  content::EditHistory history;
+  content::Entity sign;
+  sign.name = "sign-1";
+  sign.signpost.to_key = 2;
+  sign.signpost.to_map = "Tower";
+  sign.signpost.direction = Eigen::Vector3d::UnitX();
+  history.Do(content::AddEdit(scene, sign), &scene);
+  history.Do(content::TargetEdit(scene, "sign-1", "Yard", 3), &scene);
+  history.Do(content::RemoveEdit(scene, {"sign-1"}), &scene);
+  maps::MapRecord record;
+  record.key = 1;
+  record.scene = std::make_shared<maps::SceneRecord>(RecordFromScene(scene));
+  record.history = std::make_shared<maps::SceneRecord>(RecordFromHistory(history, scene));
+  library.Save(record);
+  library.Rename(3, "Court");
+  library.Remove(2);
+  AssetCache assets;
+  content::EditHistory stored = HistoryFromRecord(library.LoadHistory(1).value(), "history", &assets);
+  ASSERT_TRUE(stored.Undo(&scene));
+  EXPECT_EQ(scene.entities.at(0).signpost.to_key, 3u);
+  EXPECT_EQ(scene.entities.at(0).signpost.to_map, "Court");
+  ASSERT_TRUE(stored.Undo(&scene));
+  EXPECT_EQ(scene.entities.at(0).signpost.to_key, 0u);
+  EXPECT_EQ(scene.entities.at(0).signpost.to_map, "");
+  EXPECT_FALSE(scene.entities.at(0).signpost.direction);
+  EXPECT_THAT(library.Verify(), IsEmpty());
+}
+
 TEST(StoredHistories, KeepTheNewestChangesWithinTheLimitOfTheirModels) {
   content::Scene scene;
   content::EditHistory history;

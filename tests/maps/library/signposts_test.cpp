@@ -62,6 +62,30 @@ TEST_F(Signposts, LeadNowhereWhenTheirMapIsRemoved) {
   EXPECT_EQ(library_.SignpostsToNoMap().size(), 1u);
 }
 
+// Undo and redo restore no signpost to a map that is gone, also where the scene has none.
+TEST_F(Signposts, FollowTheirMapInUndoHistoriesToo) {
+  Add("Attic", Policy::kOpen, "no signpost");
+  for (const std::uint64_t key : {1, 4}) {
+    MapRecord record{key, "", Policy::kOpen, nullptr, nullptr};
+    record.history = MakeTextScene("sign a 0 Desk\nsign b 2 Desk\nsign c 3 Door");
+    library_.Save(record);
+  }
+  const auto history_of = [&](std::uint64_t key) { return library_.LoadHistory(key).value().text; };
+  library_.SetPolicy(3, Policy::kOpen);
+  library_.SetPolicy(4, Policy::kReadOnly);
+  library_.Rename(2, "Counter");
+  EXPECT_EQ(history_of(1), "sign a 2 Counter\nsign b 2 Counter\nsign c 3 Door");
+  EXPECT_EQ(history_of(4), history_of(1));
+  library_.Remove(2);
+  EXPECT_EQ(history_of(1), "sign a 0 \nsign b 0 \nsign c 3 Door");
+  EXPECT_EQ(history_of(4), history_of(1)) << "what could be undone does not keep a map from being removed";
+  MapRecord record{1, "", Policy::kOpen, MakeSampleMap(9), nullptr};
+  record.joined_keys = {3};
+  library_.Save(record);
+  EXPECT_EQ(history_of(4), "sign a 0 \nsign b 0 \nsign c 1 Hall");
+  EXPECT_THAT(library_.Verify(), IsEmpty());
+}
+
 TEST_F(Signposts, FollowAMapThatIsJoinedInASave) {
   MapRecord record{1, "", Policy::kOpen, MakeSampleMap(9), nullptr};
   record.joined_keys = {2};
