@@ -9,6 +9,7 @@
 #include "app/session/library_scene.h"
 #include "maps/maintenance/densify.h"
 #include "maps/maintenance/maintenance.h"
+#include "maps/storage/checksum.h"
 
 namespace docent::app {
 
@@ -80,6 +81,7 @@ bool IdleMaintenance::Adjust(const IdleMap& chosen, const std::atomic<bool>& int
   std::shared_ptr<const content::Scene> scene;
   content::EditHistory history;
   std::string name;
+  std::uint64_t stored_scene = 0;
   const maps::AdjustedMap adjusted = maps::AdjustIdleMap(*chosen.snapshot, &interrupt);
   const maps::Optimization& done = adjusted.optimization;
   if (done.outcome == maps::Optimization::Outcome::kInterrupted) return false;
@@ -92,6 +94,7 @@ bool IdleMaintenance::Adjust(const IdleMap& chosen, const std::atomic<bool>& int
     scene = map->scene;
     history = map->history;
     name = map->name;
+    stored_scene = map->stored_scene;
   }
   if (!adjusted.snapshot) return true;
   maps::MapRecord record;
@@ -99,6 +102,8 @@ bool IdleMaintenance::Adjust(const IdleMap& chosen, const std::atomic<bool>& int
   record.name = name;
   record.snapshot = adjusted.snapshot;
   record.expected_revision = chosen.snapshot->revision;
+  // Content that another program has saved meanwhile would be lost, or would stay where its anchors were.
+  record.expected_scene = stored_scene;
   const auto motions = ContentFollower().Follow(*scene, *chosen.snapshot, *adjusted.snapshot);
   if (!motions.empty()) {
     const auto moved = Moved(*scene, motions);
@@ -121,6 +126,7 @@ bool IdleMaintenance::Adjust(const IdleMap& chosen, const std::atomic<bool>& int
   }
   map->UpdateSnapshot(adjusted.snapshot);
   map->saved_snapshot = adjusted.snapshot;
+  if (record.scene) map->stored_scene = maps::SceneTextChecksum(record.scene->text);
   map->maintained_revision = adjusted.snapshot->revision;
   state_.AddEvent(state_.LastTime(), "maintenance",
                   map->name + ": reprojection error " + FormatNumber(done.rms_before_px, 3) + " px before, " +

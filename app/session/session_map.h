@@ -35,6 +35,9 @@ struct SessionMap {
   // What the library holds of the map, or will hold once the saver has finished; null when never saved.
   std::shared_ptr<const engine::MapSnapshot> saved_snapshot;
   std::shared_ptr<const content::Scene> saved_scene;
+  // Checksum of the scene's text there (maps::SceneTextChecksum). The text of the scene in memory may differ
+  // from it, since signposts get the keys and names of their maps when they are read.
+  std::uint64_t stored_scene = 0;
 
   // The mesh of its surfaces, behind which content is hidden; null while it is not known. It fits the
   // snapshot.

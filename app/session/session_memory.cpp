@@ -8,6 +8,7 @@
 #include "app/session/library_scene.h"
 #include "engine/base/error.h"
 #include "maps/library/map_copies.h"
+#include "maps/storage/checksum.h"
 
 namespace docent::app {
 
@@ -70,6 +71,7 @@ void SessionMemory::AddLoadedMap(const maps::StoredMap& stored) {
   map.snapshot = map.saved_snapshot = stored.snapshot;
   ResolveSignposts(scene.get());
   map.scene = map.saved_scene = std::move(scene);
+  map.stored_scene = maps::SceneTextChecksum(stored.scene.text);
   map.history = std::move(history);
   map.SetMesh(stored.mesh, light);
   system_.SetSnapshot(map.key, map.snapshot);

@@ -9,6 +9,7 @@
 
 #include "app/session/library_scene.h"
 #include "engine/base/error.h"
+#include "maps/storage/checksum.h"
 
 namespace docent::app {
 
@@ -53,6 +54,7 @@ void SessionSaving::SaveMap(SessionMap* map, Timestamp time) {
   if (content) {
     record.scene = std::make_shared<maps::SceneRecord>(RecordFromScene(*map->scene));
     record.history = std::make_shared<maps::SceneRecord>(RecordFromHistory(map->history, *map->scene));
+    map->stored_scene = maps::SceneTextChecksum(record.scene->text);
   }
   for (const engine::EstimatedLens& lens : system_.EstimatedLenses()) {
     if (lens.focal_sigma <= options_.mapper.lens.max_sigma)

@@ -299,7 +299,9 @@ bool Library::Save(const MapRecord& record) {
     const std::optional<MapInfo> info =
         record.key == 0 ? std::nullopt : ReadMapRow(impl_->database(), record.key);
     wanted = (!record.expected_revision || (info && info->revision == *record.expected_revision)) &&
-             (!record.expected || info == *record.expected);
+             (!record.expected || info == *record.expected) &&
+             (!record.expected_scene ||
+              (info && ReadableSceneChecksum(impl_->database(), info->key) == *record.expected_scene));
     if (!wanted) return false;
     MapInfo place;
     place.key = record.key;

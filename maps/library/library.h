@@ -115,7 +115,7 @@ class Library {
   // Adds or updates a map; see MapRecord and the table in policy.h. Unchanged parts, such as the images of
   // stored keyframes, are not rewritten. Maps that were joined into this one (MapRecord::joined_keys) are
   // removed in the same transaction. Returns false, and writes nothing, when the stored map is not the one
-  // that MapRecord::expected_revision or MapRecord::expected names.
+  // that MapRecord::expected_revision, expected or expected_scene names.
   bool Save(const MapRecord& record);
   // Stores the mesh of a map's surfaces. It is computed from the rest of the map, so that no policy forbids
   // it and the map does not count as changed. A save that moves or removes a keyframe of the mesh removes it.

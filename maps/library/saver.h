@@ -30,7 +30,7 @@ class Saver {
   using Saved = std::function<void(const MapRecord& record)>;
   // Work for the second thread. It must end soon after `interrupt` is set. It returns whether it did
   // something; if so it is called again at once, else after a while. What it writes must not undo a save
-  // meanwhile (MapRecord::expected_revision).
+  // meanwhile (MapRecord::expected_revision and expected_scene).
   using Maintenance = std::function<bool(const std::atomic<bool>& interrupt)>;
   // `library` must be opened for writing and outlive the saver. `capacity` is the number of maps that can
   // wait; Submit blocks when the queue is full. `saved` is called on the saver's thread for each record that

@@ -7,6 +7,7 @@
 
 #include "engine/base/error.h"
 #include "maps/library/policy_refusal.h"
+#include "maps/storage/checksum.h"
 #include "maps/storage/history_rows.h"
 #include "maps/storage/map_codec.h"
 #include "maps/storage/rows.h"
@@ -56,6 +57,16 @@ SceneRecord ReadUndamagedScene(const Database& database, std::uint64_t key,
     problems->emplace_back(error.what());
   }
   return scene;
+}
+
+std::uint64_t ReadableSceneChecksum(const Database& database, std::uint64_t key) {
+  std::string text;
+  try {
+    text = ReadScenePart(database, key).text;
+  } catch (const Error&) {
+    text.clear();  // Verify reports it.
+  }
+  return SceneTextChecksum(text);
 }
 
 void WriteScene(const Database& database, std::uint64_t key, const SceneRecord& scene) {

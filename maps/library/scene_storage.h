@@ -18,6 +18,8 @@ SceneRecord ReadScene(const Database& database, std::uint64_t key);
 // out.
 SceneRecord ReadUndamagedScene(const Database& database, std::uint64_t key,
                                std::vector<std::string>* problems);
+// The checksum of the text of the scene, which is empty if it is damaged, as in ReadUndamagedScene.
+std::uint64_t ReadableSceneChecksum(const Database& database, std::uint64_t key);
 void WriteScene(const Database& database, std::uint64_t key, const SceneRecord& scene);
 // Replaces the text only. An undo history of the scene still fits, as no entity was added, moved or removed.
 void WriteSceneText(const Database& database, std::uint64_t key, const std::string& text);

@@ -12,6 +12,7 @@
 #include "engine/vision/image_pyramid.h"
 #include "maps/library/library.h"
 #include "maps/maintenance/salvaged_rows.h"
+#include "maps/storage/checksum.h"
 #include "maps/storage/database.h"
 #include "maps/storage/history_rows.h"
 #include "maps/storage/panorama_codec.h"

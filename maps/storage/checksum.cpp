@@ -9,4 +9,8 @@ std::uint64_t Checksum(std::span<const std::uint8_t> bytes, std::uint64_t seed) 
   return XXH64(bytes.data(), bytes.size(), seed);
 }
 
+std::uint64_t SceneTextChecksum(const std::string& text) {
+  return Checksum({reinterpret_cast<const std::uint8_t*>(text.data()), text.size()});
+}
+
 }  // namespace docent::maps

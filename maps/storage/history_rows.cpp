@@ -6,7 +6,6 @@
 #include <utility>
 
 #include "engine/base/error.h"
-#include "maps/storage/checksum.h"
 #include "maps/storage/envelope.h"
 #include "maps/storage/rows.h"
 
@@ -21,10 +20,6 @@ constexpr const char* kHistoryPart = "history";
 }
 
 }  // namespace
-
-std::uint64_t SceneTextChecksum(const std::string& text) {
-  return Checksum({reinterpret_cast<const std::uint8_t*>(text.data()), text.size()});
-}
 
 Bytes EncodeHistory(std::uint64_t map_key, const HistoryPart& history) {
   if (history.changes.text.size() > kMaxHistoryTextBytes)

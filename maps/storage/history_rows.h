@@ -16,13 +16,11 @@
 namespace docent::maps {
 
 struct HistoryPart {
-  std::uint64_t scene = 0;  // Checksum of the text of the scene.
+  std::uint64_t scene = 0;  // SceneTextChecksum.
   ScenePart changes;        // The history's text and the ids of its assets.
 
   bool operator==(const HistoryPart& other) const = default;
 };
-
-std::uint64_t SceneTextChecksum(const std::string& text);
 
 // The encoding throws when the text is longer than kMaxHistoryTextBytes.
 Bytes EncodeHistory(std::uint64_t map_key, const HistoryPart& history);

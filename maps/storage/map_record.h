@@ -81,6 +81,9 @@ struct MapRecord {
   // If set, the save only succeeds if the stored map still has this entry in the list of maps. A change of
   // its content by another program, which leaves the revision as it is, changes the time in the entry.
   std::optional<MapInfo> expected = std::nullopt;
+  // If set, the save only succeeds if the text of the stored scene has this checksum (SceneTextChecksum), for
+  // a caller that does not know the entry, because it saves the map itself meanwhile.
+  std::optional<std::uint64_t> expected_scene = std::nullopt;
 };
 
 // The result of joining two maps (see joining.h).

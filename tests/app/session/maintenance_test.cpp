@@ -8,11 +8,13 @@
 #include <chrono>
 #include <cstdlib>
 #include <future>
+#include <mutex>
 #include <thread>
 
 #include "app/session/library_scene.h"
 #include "app/session/maintenance_order.h"
 #include "engine/base/random.h"
+#include "engine/vision/features.h"
 #include "maps/maintenance/maintenance.h"
 #include "tests/app/support/simulated_session.h"
 #include "tests/app/support/temporary_folder.h"
@@ -116,6 +118,68 @@ TEST_F(IdleMaps, AreAdjustedWhileTheSessionIsIdle) {
   EXPECT_EQ(open->snapshot->revision, library.FindByName("Open").revision);
 }
 
+content::Scene SignOfMaintenance(const std::string& text) {
+  content::Scene scene;
+  content::Entity sign;
+  sign.name = "sign-1";
+  sign.signpost.text = text;
+  sign.signpost.anchor = {0, 0, 1};
+  scene.entities.push_back(sign);
+  return scene;
+}
+
+// The anchors of the other program's content would move without it.
+TEST_F(IdleMaps, AreNotAdjustedWhenAnotherProgramHasChangedTheirContent) {
+  const auto simulation = Room(1);
+  const auto save = [](maps::Library* library, std::uint64_t key, const std::string& text) {
+    library->Save({key, "", maps::Policy::kOpen, nullptr,
+                   std::make_shared<maps::SceneRecord>(RecordFromScene(SignOfMaintenance(text)))});
+  };
+  auto other = maps::Library::Open(file_, maps::Access::kReadWrite);
+  const std::uint64_t open = other.FindByName("Open").key, less = other.NewKey();
+  save(&other, open, "ours");
+  other.Save({less, "Less", maps::Policy::kOpen, Crooked(0.003), nullptr});
+  const auto before = other.Load(open).snapshot;
+  // The other program saves while the session reads the images, after its transaction has begun.
+  std::once_flag once;
+  maps::LibraryOptions options;
+  options.load_threads = 1;
+  options.make_features = [&](const cv::Mat& gray) {
+    std::call_once(once, [&] { save(&other, open, "theirs"); });
+    return engine::MakeFeatures(gray);
+  };
+  auto library = maps::Library::Open(file_, maps::Access::kReadWrite, maps::CreateIfMissing::kNo, options);
+  Session session(Options(Pace::kEager, ""), LensOf(*simulation), &library);
+  const auto maps = session.Maps();
+  ASSERT_EQ(maps.at(0).key, open);
+  ASSERT_EQ(maps.at(0).scene->entities.at(0).signpost.text, "ours");
+  // The map with the larger error comes first.
+  const std::vector<std::string> done = AwaitMaintenance(&session);
+  session.Finish();
+  ASSERT_EQ(done.size(), 1u);
+  EXPECT_THAT(done[0], HasSubstr("Less: "));
+  EXPECT_EQ(library.FindByName("Open").revision, before->revision);
+  EXPECT_THAT(library.LoadScene(open).text, HasSubstr("theirs"));
+}
+
+TEST_F(IdleMaps, AreAdjustedWithContentThatTheSessionReadsInAnotherForm) {
+  const auto simulation = Room(1);
+  auto library = maps::Library::Open(file_, maps::Access::kReadWrite);
+  {
+    maps::MapRecord record;
+    record.key = library.FindByName("Open").key;
+    content::Scene scene = SignOfMaintenance("here");
+    scene.entities[0].signpost.to_map = "Fixed";  // Without a key, which the session adds.
+    record.scene = std::make_shared<maps::SceneRecord>(RecordFromScene(scene));
+    library.Save(record);
+  }
+  Session session(Options(Pace::kEager, ""), LensOf(*simulation), &library);
+  ASSERT_EQ(AwaitMaintenance(&session).size(), 1u);
+  session.Finish();
+  EXPECT_GT(library.FindByName("Open").revision, WalkedMap()->revision);
+  EXPECT_THAT(library.LoadScene(library.FindByName("Open").key).text, HasSubstr("here"));
+}
+
 TEST_F(IdleMaps, AreNotAdjustedOnATourOrInLockstep) {
   const auto simulation = Room(1);
   // Three sessions with a copy of the library each. The one that maintains its maps begins last: when it is
@@ -199,14 +263,9 @@ class SlowDisk {
 TEST_F(IdleMaps, AreSavedWhileAPolicyCommandWaitsForTheDiskWithoutDelayingFrames) {
   using namespace std::chrono_literals;
   {
-    content::Scene scene;
-    content::Entity sign;
-    sign.name = "sign-1";
-    sign.signpost.text = "here";
-    scene.entities.push_back(sign);
     auto library = maps::Library::Open(file_, maps::Access::kReadWrite);
     library.Save({library.NewKey(), "Current", maps::Policy::kAugmentOnly, WalkedMap(),
-                  std::make_shared<maps::SceneRecord>(RecordFromScene(scene))});
+                  std::make_shared<maps::SceneRecord>(RecordFromScene(SignOfMaintenance("here")))});
   }
   SlowDisk disk;
   const auto simulation = Room(1);
