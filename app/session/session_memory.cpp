@@ -72,6 +72,7 @@ void SessionMemory::AddLoadedMap(const maps::StoredMap& stored) {
   ResolveSignposts(scene.get());
   map.scene = map.saved_scene = std::move(scene);
   map.stored_scene = maps::SceneTextChecksum(stored.scene.text);
+  history.RetargetSignposts([this](content::Signpost* signpost) { return state_.Resolve(signpost); });
   map.history = std::move(history);
   map.SetMesh(stored.mesh, light);
   system_.SetSnapshot(map.key, map.snapshot);
@@ -125,19 +126,14 @@ content::EditHistory SessionMemory::StoredHistory(std::uint64_t key, const std::
   return {};
 }
 
-// A signpost leads to a map by its key; the name is the one that the map has now. A signpost of an older
-// library has only the name.
-void SessionMemory::ResolveSignposts(content::Scene* scene) {
+// On a tour, signposts lead to the newest one of maps that are copies of each other.
+void SessionMemory::ResolveSignposts(content::Scene* scene) const {
   for (content::Entity& entity : scene->entities) {
     if (entity.kind != content::Entity::Kind::kSignpost) continue;
     content::Signpost& signpost = entity.signpost;
     if (const auto copy = replaced_.find(signpost.to_key); copy != replaced_.end())
       signpost.to_key = copy->second;
-    if (signpost.to_key != 0) {
-      if (const SessionMap* const map = state_.FindMap(signpost.to_key)) signpost.to_map = map->name;
-    } else if (const SessionMap* const map = state_.FindByName(signpost.to_map)) {
-      signpost.to_key = map->key;
-    }
+    state_.Resolve(&signpost);
   }
 }
 

@@ -59,7 +59,7 @@ class SessionMemory {
   // The name that the session has for a map.
   std::string NameOf(const maps::MapInfo& info) const;
   // With it.
-  void ResolveSignposts(content::Scene* scene);
+  void ResolveSignposts(content::Scene* scene) const;
 
   const SessionOptions& options_;
   const maps::Library* const library_;

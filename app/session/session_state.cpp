@@ -9,6 +9,25 @@
 
 namespace docent::app {
 
+namespace {
+
+// The map that a signpost leads to, even if it no longer exists; null if it leads to none of these.
+const SessionMap* MapOf(const content::Signpost& signpost, const std::map<std::uint64_t, SessionMap>& maps) {
+  if (signpost.to_key != 0) {
+    const auto found = maps.find(signpost.to_key);
+    return found != maps.end() ? &found->second : nullptr;
+  }
+  const SessionMap* joined = nullptr;
+  for (const auto& [key, map] : maps) {
+    if (signpost.to_map.empty() || map.name != signpost.to_map) continue;
+    if (map.Exists()) return &map;
+    if (map.joined_into != 0) joined = &map;
+  }
+  return joined;
+}
+
+}  // namespace
+
 void SessionCamera::Advise(const std::string& sentence) {
   constexpr Timestamp kShown = std::chrono::seconds(15);
   advice = sentence;
@@ -67,6 +86,24 @@ SessionMap& SessionState::InitializedMap(const std::string& name) {
 std::string SessionState::NameOf(std::uint64_t key) const {
   const auto found = maps.find(key);
   return found != maps.end() ? found->second.name : std::string();
+}
+
+bool SessionState::Resolve(content::Signpost* signpost) const {
+  const SessionMap* map = MapOf(*signpost, maps);
+  if (map == nullptr) return false;
+  while (map->joined_into != 0) {
+    const auto into = maps.find(map->joined_into);
+    if (into == maps.end()) return false;
+    map = &into->second;
+  }
+  if (map->discarded) {
+    content::LeadNowhere(signpost);
+    return true;
+  }
+  if (signpost->to_key == map->key && signpost->to_map == map->name) return false;
+  signpost->to_key = map->key;
+  signpost->to_map = map->name;
+  return true;
 }
 
 std::string SessionState::FreeMapName(const std::string& name) const {

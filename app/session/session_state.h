@@ -51,6 +51,11 @@ struct SessionState {
   // Throws Error if there is no map with this name, or if it has no snapshot.
   SessionMap& InitializedMap(const std::string& name);
   std::string NameOf(std::uint64_t key) const;  // empty when the session has no such map
+  // Makes a signpost that was read from the library lead to where its map is now: by its key, with the name
+  // that the map has, to the map that it was joined into, or nowhere if it was discarded. Without a key, as
+  // in an older library, by its name. One that leads to no map of the session stays as it is. Returns whether
+  // it changed.
+  bool Resolve(content::Signpost* signpost) const;
   // A name for a map that continues the one of this name: "Hall" becomes "Hall 2", and "Hall 2" "Hall 3". The
   // name of a map that was joined into another one is not used again: frames.csv has it for the images
   // before.

@@ -89,6 +89,31 @@ TEST(SessionState, RetargetsSignpostsByKeyAndByNameOnlyWithoutKey) {
   EXPECT_EQ(SignpostIn(state, 3).to_map, "Tower");
 }
 
+TEST(SessionState, ResolvesSignpostsOfMapsThatAreReadLater) {
+  SessionState state({});
+  state.AddMap(1, "Hall");
+  state.AddMap(2, "Hall 2").joined_into = 1;
+  state.AddMap(3, "Hall 3").joined_into = 2;
+  state.AddMap(4, "Yard").discarded = true;
+  const auto resolved = [&](std::uint64_t key, const std::string& map) {
+    content::Signpost signpost;
+    signpost.to_key = key;
+    signpost.to_map = map;
+    signpost.direction = Eigen::Vector3d::UnitX();
+    state.Resolve(&signpost);
+    return std::to_string(signpost.to_key) + signpost.to_map + (signpost.direction ? " >" : "");
+  };
+  EXPECT_EQ(resolved(1, "old name"), "1Hall >");
+  EXPECT_EQ(resolved(0, "Hall"), "1Hall >");
+  EXPECT_EQ(resolved(2, "Hall 2"), "1Hall >");
+  EXPECT_EQ(resolved(3, "Hall 3"), "1Hall >") << "joined twice";
+  EXPECT_EQ(resolved(0, "Hall 2"), "1Hall >");
+  EXPECT_EQ(resolved(4, "Yard"), "0");
+  EXPECT_EQ(resolved(0, "Yard"), "0Yard >") << "another map may have the name";
+  EXPECT_EQ(resolved(9, "Attic"), "9Attic >") << "it may come from a hub later";
+  EXPECT_EQ(resolved(0, ""), "0 >");
+}
+
 TEST(SessionState, UndoRestoresNoSignpostToAMapThatIsGoneOrHasAnotherName) {
   SessionState state({});
   SessionMap& map = state.AddMap(1, "Hall");

@@ -1,0 +1,60 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "app/session/session_memory.h"
+
+#include <gtest/gtest.h>
+
+#include "content/edits.h"
+#include "tests/app/support/simulated_session.h"
+#include "tests/app/support/temporary_folder.h"
+
+namespace docent::app {
+namespace {
+
+// A map is read after the one that its signposts lead to was joined into another one, which is not saved yet.
+TEST(SessionMemory, ReadsSignpostsAndChangesOfThemThatFollowAJoinedMap) {
+  const TemporaryFolder folder;
+  maps::Library library =
+      OpenLibrary(folder / "l.docent", maps::Access::kReadWrite, maps::CreateIfMissing::kYes);
+  for (const char* name : {"Hall", "Hall 2", "Yard"})
+    library.Save({library.NewKey(), name, maps::Policy::kOpen, nullptr, nullptr});
+  content::Scene scene;
+  content::EditHistory history;
+  for (const char* name : {"kept", "removed"}) {
+    content::Entity sign;
+    sign.name = name;
+    sign.signpost.to_key = 2;
+    sign.signpost.to_map = "Hall 2";
+    history.Do(content::AddEdit(scene, sign), &scene);
+  }
+  history.Do(content::RemoveEdit(scene, {"removed"}), &scene);
+  maps::MapRecord record;
+  record.key = 3;
+  record.scene = std::make_shared<maps::SceneRecord>(RecordFromScene(scene));
+  record.history = std::make_shared<maps::SceneRecord>(RecordFromHistory(history, scene));
+  library.Save(record);
+
+  SessionOptions options = simulated_session::Options(Pace::kLockstep, "");
+  options.memory.left_out = {3};  // Not read at the start.
+  const auto cameras = simulated_session::LensOf(*simulated_session::Room(1));
+  engine::System system(options, cameras);
+  std::mutex mutex;
+  SessionState state(cameras);
+  SessionAssets assets;
+  SessionMemory memory(options, &library, &system, &mutex, &state, &assets);
+  memory.Open();
+  SessionMap& yard = *state.FindMap(3);
+  ASSERT_FALSE(yard.snapshot);
+  state.FindMap(2)->joined_into = 1;
+  memory.LoadFor(UseMap{"Yard"});
+  ASSERT_TRUE(yard.snapshot);
+  EXPECT_FALSE(yard.NeedsSave()) << "the library does the same when it saves the joined map";
+  content::Scene undone = *yard.scene;
+  ASSERT_TRUE(yard.history.Undo(&undone));
+  for (const char* name : {"kept", "removed"}) {
+    EXPECT_EQ(undone.Find(name)->signpost.to_key, 1u) << name;
+    EXPECT_EQ(undone.Find(name)->signpost.to_map, "Hall") << name;
+  }
+}
+
+}  // namespace
+}  // namespace docent::app
