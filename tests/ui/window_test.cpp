@@ -3,13 +3,10 @@
 
 #include <gmock/gmock.h>
 
-#include <atomic>
-#include <chrono>
-#include <cmath>
 #include <cstdlib>
 #include <optional>
-#include <thread>
 
+#include "tests/support/person_at_window.h"
 #include "tests/support/virtual_screen.h"
 #include "tests/ui/asked_for.h"
 #include "tests/ui/ui_testing.h"
@@ -63,30 +60,8 @@ class InterfaceOnScreen : public ::testing::Test {
     window_->Show();
   }
 
-  // Draws while the person acts; the words are those of xdotool. Without a window manager the window's corner
-  // is the screen's corner. Buttons and keys are held long enough that some frame polls them.
-  void Act(const std::string& xdotool) {
-    std::atomic<bool> done = false;
-    std::thread hand([&] {
-      EXPECT_EQ(std::system(("xdotool " + xdotool).c_str()), 0);
-      done = true;
-    });
-    while (!done) {
-      Draw();
-      std::this_thread::sleep_for(std::chrono::milliseconds(5));
-    }
-    hand.join();
-    for (int i = 0; i < 5; ++i) Draw();
-  }
-  void Click(const Eigen::Vector2d& point) {
-    Act("mousemove " + std::to_string(std::lround(point.x())) + " " + std::to_string(std::lround(point.y())) +
-        " sleep 0.1 mousedown 1 sleep 0.15 mouseup 1 sleep 0.1");
-  }
-  // The window has the keyboard focus without a window manager only if it is given to it.
-  void Press(const std::string& key) {
-    Act("search --name Docent windowfocus sleep 0.1 keydown " + key + " sleep 0.1 keyup " + key +
-        " sleep 0.1");
-  }
+  void Click(const Eigen::Vector2d& point) { person_.Click(point); }
+  void Press(const std::string& key) { person_.Press(key); }
 
   VirtualScreen screen_{"1024x768"};
   std::optional<Window> window_;
@@ -100,6 +75,7 @@ class InterfaceOnScreen : public ::testing::Test {
   QuitDialog dialog_;
   WindowLayout layout_;
   std::vector<InputEvent> events_;
+  PersonAtWindow person_{[this] { Draw(); }};
 };
 
 using ::testing::ElementsAre;
@@ -123,7 +99,7 @@ TEST_F(InterfaceOnScreen, EnterInTheNameStartsTheMap) {
   EXPECT_TRUE(gui_->IsNavigated());
   for (int i = 0; i < 8 && !gui_->WritesText(); ++i) Press("Tab");
   ASSERT_TRUE(gui_->WritesText());
-  Act("search --name Docent windowfocus sleep 0.1 type --delay 60 Hall");
+  person_.Type("Hall");
   EXPECT_EQ(panel_->choices().map_name, "Hall");
   Press("Return");
   EXPECT_THAT(asked_.words, ElementsAre("new map Hall"));
@@ -217,7 +193,8 @@ TEST_F(InterfaceOnScreen, TheCurrentMapIsRenamedInItsField) {
   panel_->BeginMapRename();
   for (int i = 0; i < 3; ++i) Draw();
   ASSERT_TRUE(gui_->WritesText());
-  Act("search --name Docent windowfocus sleep 0.1 key ctrl+a sleep 0.1 type --delay 60 Cove");
+  Press("ctrl+a");
+  person_.Type("Cove");
   Press("Return");
   EXPECT_THAT(asked_.words, ElementsAre("rename map Hall to Cove"));
 }

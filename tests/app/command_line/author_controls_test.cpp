@@ -4,13 +4,11 @@
 
 #include <gmock/gmock.h>
 
-#include <atomic>
-#include <chrono>
 #include <cstdlib>
 #include <optional>
-#include <thread>
 
 #include "tests/app/support/temporary_folder.h"
+#include "tests/support/person_at_window.h"
 #include "tests/support/virtual_screen.h"
 
 namespace docent::app {
@@ -65,20 +63,6 @@ class AuthorAtControls : public ::testing::Test {
     return view;
   }
 
-  // Draws while the author acts; the words are those of xdotool.
-  void Act(const std::string& xdotool) {
-    std::atomic<bool> done = false;
-    std::thread hand([&] {
-      EXPECT_EQ(std::system(("xdotool search --name Docent windowfocus sleep 0.1 " + xdotool).c_str()), 0);
-      done = true;
-    });
-    while (!done) {
-      Draw(1);
-      std::this_thread::sleep_for(std::chrono::milliseconds(5));
-    }
-    hand.join();
-    Draw(5);
-  }
   void BeginName() {
     controls_->Select("sign-1", false);
     ui::InputEvent rename;
@@ -88,9 +72,10 @@ class AuthorAtControls : public ::testing::Test {
   }
   void WriteName() {
     BeginName();
-    Act("key ctrl+a sleep 0.1 type --delay 60 Cove");
+    person_.Press("ctrl+a");
+    person_.Type("Cove");
   }
-  void PressReturn() { Act("keydown Return sleep 0.1 keyup Return sleep 0.1"); }
+  void PressReturn() { person_.Press("Return"); }
   void LoseTheCamera() {
     is_in_map_ = false;
     Draw(3);
@@ -106,6 +91,7 @@ class AuthorAtControls : public ::testing::Test {
   std::optional<AuthorControls> controls_;
   SavingState saving_;
   bool is_in_map_ = true;
+  PersonAtWindow person_{[this] { Draw(1); }};
 };
 
 TEST_F(AuthorAtControls, WhatIsBeingWrittenIsNotLostWithTheCamera) {
@@ -176,10 +162,10 @@ TEST_F(AuthorAtControls, WhatIsBeingWrittenIsACommandBeforeThePanelCloses) {
 
 TEST_F(AuthorAtControls, WhatIsBeingWrittenIsAChangeThatQuittingAsksAbout) {
   WriteName();
-  Act("key ctrl+q");
+  person_.Press("ctrl+q");
   EXPECT_THAT(commands_, ElementsAre(Command(RenameEntity{"sign-1", "Cove"})));
   EXPECT_EQ(controls_->ending(), AuthorControls::Ending::kNone);
-  Act("key Return");
+  PressReturn();
   EXPECT_EQ(controls_->ending(), AuthorControls::Ending::kSave) << "the answer that is chosen at first";
 }
 
@@ -196,7 +182,7 @@ TEST_F(AuthorAtControls, WhatIsBeingWrittenIsNotLostToTheQuestionWhetherToSave) 
 
 TEST_F(AuthorAtControls, QuittingAsksNothingWhereNothingWasWritten) {
   BeginName();
-  Act("key ctrl+q");
+  person_.Press("ctrl+q");
   EXPECT_THAT(commands_, IsEmpty());
   EXPECT_EQ(controls_->ending(), AuthorControls::Ending::kSave);
 }
