@@ -36,6 +36,11 @@ void SessionMemory::Open() {
   }
   maps::MapPager::Callbacks callbacks;
   callbacks.loaded = [this](const maps::StoredMap& stored) { AddLoadedMap(stored); };
+  callbacks.exists = [this](std::uint64_t key) {
+    const std::scoped_lock lock(mutex_);
+    const SessionMap* const map = state_.FindMap(key);
+    return map != nullptr && map->Exists();
+  };
   callbacks.evict = [this](std::uint64_t key) { return Evict(key); };
   callbacks.failed = [this](std::uint64_t, const std::string& problem) {
     const std::scoped_lock lock(mutex_);
@@ -66,7 +71,7 @@ void SessionMemory::AddLoadedMap(const maps::StoredMap& stored) {
   assets_.Merge(&assets);
   // A map that another process saved since the session began is not part of the session.
   SessionMap* const known = state_.FindMap(stored.info.key);
-  if (known == nullptr || known->changed) return;
+  if (known == nullptr || !known->Exists() || known->changed) return;
   SessionMap& map = *known;
   map.snapshot = map.saved_snapshot = stored.snapshot;
   ResolveSignposts(scene.get());

@@ -162,6 +162,7 @@ void MapPager::Impl::Read(std::uint64_t key) {
     bytes = BytesOf(*map.snapshot);
     if (callbacks_.loaded) callbacks_.loaded(map);
     index_->SetMap(key, map.snapshot);
+    if (callbacks_.exists && !callbacks_.exists(key)) return index_->RemoveMap(key);
   } catch (const Error&) {
     const std::scoped_lock lock(mutex_);
     unreadable_.insert(key);

@@ -46,6 +46,9 @@ class MapPager : public engine::PlaceFinder {
     // (StoredMap::lost_content). May throw docent::Error to mark the map as
     // unreadable.
     std::function<void(const StoredMap& map)> loaded;
+    // Asks whether the owner still has the map. Called after a map was added to the index, because it may
+    // have been removed while it was read; it then leaves the index again.
+    std::function<bool(std::uint64_t key)> exists;
     // Asks whether a map may be evicted now; return false if it has unsaved changes. After true the pager no
     // longer refers to it.
     std::function<bool(std::uint64_t key)> evict;

@@ -139,6 +139,24 @@ TEST_F(Pager, ReportsAnUnreadableMapOnceAndContinues) {
   EXPECT_EQ(pager.FindPlaces(ViewOf(3), 1, 1, 0).size(), 1u);
 }
 
+TEST_F(Pager, AMapThatIsRemovedWhileItIsReadIsNotFoundAgain) {
+  MakeLibrary(3);
+  bool removed = false;
+  MapPager::Callbacks callbacks;
+  callbacks.loaded = [&](const StoredMap& map) {
+    if (map.info.key != 2) return;
+    removed = true;
+    index_.RemoveMap(2);
+  };
+  callbacks.exists = [&](std::uint64_t key) { return key != 2 || !removed; };
+  MapPager pager(&*library_, &index_, Options(2.5), callbacks);
+  pager.Open();
+  for (const std::uint64_t key : {1, 2}) pager.FindPlaces(ViewOf(key), 1, 1, 0);
+  EXPECT_TRUE(removed);
+  EXPECT_EQ(index_.keyframes(), 4u);
+  EXPECT_THAT(pager.maps_in_memory(), ElementsAre(1));
+}
+
 TEST_F(Pager, LoadsInTheBackgroundWhenQueriesMustNotWait) {
   MakeLibrary(6);
   PagerOptions options = Options(2.5);
