@@ -145,7 +145,7 @@ void SessionMemory::ResolveSignposts(content::Scene* scene) const {
 bool SessionMemory::Evict(std::uint64_t key) {
   const std::scoped_lock lock(mutex_);
   SessionMap* const found = state_.FindMap(key);
-  if (found == nullptr) return true;
+  if (found == nullptr || found->discarded) return true;
   SessionMap& map = *found;
   if (map.changed || map.NeedsSave() || system_.IsInUse(key)) return false;
   system_.SetSnapshot(key, nullptr);
