@@ -59,6 +59,9 @@ class CameraFeed {
   void Pause(const std::stop_token& stop);
   // Carries out what the person wants while there is no other image, `passed` after the last one.
   void CarryOut(Timestamp passed, bool at_end);
+  // Carries out what the person wanted since the last image: while images are dropped or missing, and after
+  // the last one.
+  void CarryOutGiven();
   // The time between two calls of CarryOut.
   static void Rest(const std::stop_token& stop);
   // Throws Error if the images ended before the last command of the script.
@@ -83,8 +86,6 @@ class CameraFeed {
   engine::TrackedFrame Track();
   // Passes on what was fetched meanwhile.
   void ReportUntracked();
-  // Carries out what the person wants while images are dropped or missing.
-  void CarryOutGiven();
   // The device may stay away for long, but the person is still there.
   void ContinueDisconnected();
 

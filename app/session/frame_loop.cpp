@@ -149,9 +149,12 @@ void RunCameras(const std::vector<CameraRun>& cameras, Session* session, const s
   } else {
     RunConcurrently(&feeds, pace, &stopping);
   }
-  if (stop.stop_requested()) return;
-  for (const CameraFeed& feed : feeds) feed.CheckAllDone();
-  if (cameras.front().options.stays) StayAtEnd(&feeds, stop);
+  if (!stop.stop_requested()) {
+    for (const CameraFeed& feed : feeds) feed.CheckAllDone();
+    if (cameras.front().options.stays) StayAtEnd(&feeds, stop);
+  }
+  // A person who quits has given these commands before.
+  for (CameraFeed& feed : feeds) feed.CarryOutGiven();
 }
 
 void RunFrames(CalibratedCamera* camera, Session* session, const FrameLoopOptions& options,

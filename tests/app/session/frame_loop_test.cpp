@@ -308,6 +308,35 @@ TEST(FrameLoop, CarriesOutCommandsWhileAllImagesAreLate) {
   EXPECT_THAT(taken, ElementsAre(5u, 9u)) << "with the image after which they were given";
 }
 
+TEST(FrameLoop, CarriesOutWhatAPersonWantsJustBeforeQuitting) {
+  for (const Pace pace : {Pace::kEager, Pace::kLockstep}) {
+    CalibratedCamera camera = Calibrate(std::make_unique<Recording>(3), std::nullopt);
+    SessionOptions options;
+    options.may_write = false;
+    options.threaded = pace != Pace::kLockstep;
+    Session session(options, {camera.model}, nullptr);
+    CommandInbox inbox;
+    std::stop_source stopping;
+    std::vector<std::uint64_t> taken;
+    FrameLoopOptions loop;
+    loop.pace = pace;
+    loop.inbox = &inbox;
+    loop.take = [&](const Command&, const engine::TrackedFrame& frame) {
+      taken.push_back(frame.frame.index);
+      return true;
+    };
+    RunFrames(
+        &camera, &session, loop,
+        [&](const engine::TrackedFrame& frame) {
+          if (frame.frame.index != 1) return;
+          inbox.Push({GuideVisitor{}, nullptr});
+          stopping.request_stop();
+        },
+        stopping.get_token());
+    EXPECT_THAT(taken, ElementsAre(1u)) << ToString(pace);
+  }
+}
+
 TEST(FrameLoop, ReportsTheAgeOfALiveImageFromItsTimestamp) {
   SteppedClock clock;
   const Timestamp taken = clock.Now() - std::chrono::milliseconds(30);
