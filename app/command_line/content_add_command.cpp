@@ -25,6 +25,7 @@
 #include "engine/base/error.h"
 #include "engine/map/upright_axes.h"
 #include "maps/library/library.h"
+#include "maps/library/session_lock.h"
 
 namespace docent::app {
 
@@ -145,6 +146,7 @@ std::string FreeNameFor(const content::Scene& scene, const content::Entity& enti
 
 void Add(const AddOptions& options, Verbosity verbosity) {
   maps::Library library = OpenLibrary(options.library, maps::Access::kReadWrite);
+  const maps::SessionLock lock(options.library, maps::SessionLockKind::kReplace);
   const maps::MapInfo map = library.FindByName(options.map);
   std::uint64_t to_key = 0;
   if (!options.to_map.empty()) to_key = library.FindByName(options.to_map).key;  // Throws if there is none.

@@ -19,6 +19,7 @@
 #include "content/edits.h"
 #include "content/occluder.h"
 #include "maps/library/library.h"
+#include "maps/library/session_lock.h"
 
 namespace docent::app {
 
@@ -127,6 +128,7 @@ void List(const ContentOptions& options) {
 
 void Remove(const ContentOptions& options) {
   maps::Library library = OpenLibrary(options.library, maps::Access::kReadWrite);
+  const maps::SessionLock lock(options.library, maps::SessionLockKind::kReplace);
   const MakeEdit edits[] = {
       [&](const content::Scene& stored) { return content::RemoveEdit(stored, options.names); }};
   EditStoredScene(&library, library.FindByName(options.map), edits);

@@ -17,6 +17,7 @@
 #include "app/session/way_to_map.h"
 #include "engine/base/error.h"
 #include "engine/mapping/loops/map_joining.h"
+#include "maps/library/session_lock.h"
 
 namespace docent::app {
 
@@ -177,6 +178,7 @@ void RunEdit(const EditOptions& options) {
       throw Error(FormatCommand(command) + ": " + problem + ".");
   }
   maps::Library library = OpenLibrary(options.library, maps::Access::kReadWrite);
+  const maps::SessionLock lock(options.library, maps::SessionLockKind::kReplace);
   const maps::MapInfo map = library.FindByName(options.map);
   const StoredEdits edit_for(library, map, options.find_direction);
   std::vector<MakeEdit> edits;

@@ -16,6 +16,7 @@
 #include "app/session/library_scene.h"
 #include "engine/base/error.h"
 #include "maps/library/library.h"
+#include "maps/library/session_lock.h"
 #include "maps/maintenance/relocalization_check.h"
 
 namespace docent::app {
@@ -188,6 +189,7 @@ void Verify(const MapsOptions& options) {
 
 void Rename(const MapsOptions& options) {
   maps::Library library = OpenToWrite(options);
+  const maps::SessionLock lock(options.library, maps::SessionLockKind::kReplace);
   library.Rename(library.FindByName(options.name).key, options.new_name);
 }
 
@@ -219,6 +221,7 @@ void RefuseIfNeeded(const std::string& map, std::size_t signposts, std::size_t t
 
 void Remove(const MapsOptions& options) {
   maps::Library library = OpenToWrite(options);
+  const maps::SessionLock lock(options.library, maps::SessionLockKind::kReplace);
   const std::uint64_t key = library.FindByName(options.name).key;
   const std::vector<maps::Library::Signpost> signposts = library.SignpostsTo(key);
   for (const maps::Library::Signpost& signpost : signposts) {
@@ -237,6 +240,7 @@ void Remove(const MapsOptions& options) {
 
 void SetMapPolicy(const MapsOptions& options) {
   maps::Library library = OpenToWrite(options);
+  const maps::SessionLock lock(options.library, maps::SessionLockKind::kReplace);
   library.SetPolicy(library.FindByName(options.name).key, *maps::ParsePolicy(options.policy));
 }
 

@@ -24,6 +24,7 @@
 #include "maps/exchange/mesh_ply.h"
 #include "maps/exchange/view_from_above.h"
 #include "maps/library/map_copies.h"
+#include "maps/library/session_lock.h"
 #include "maps/maintenance/densify.h"
 #include "maps/maintenance/joining.h"
 #include "maps/maintenance/maintenance.h"
@@ -214,6 +215,7 @@ class InterruptFlag {
 };
 
 void Optimize(const ExchangeOptions& options, Verbosity verbosity) {
+  const maps::SessionLock lock(options.library, maps::SessionLockKind::kReplace);
   maps::Library library = OpenLibrary(options.library, maps::Access::kReadWrite);
   std::vector<maps::MapInfo> infos = library.List();
   if (!options.name.empty()) infos = {library.FindByName(options.name)};
@@ -265,6 +267,7 @@ void Densify(const ExchangeOptions& options, Verbosity verbosity) {
 }
 
 void Join(const ExchangeOptions& options, Verbosity verbosity) {
+  const maps::SessionLock lock(options.library, maps::SessionLockKind::kReplace);
   maps::Library library = OpenLibrary(options.library, maps::Access::kReadWrite);
   const std::uint64_t into = library.FindByName(options.name).key,
                       from = library.FindByName(options.other_name).key;

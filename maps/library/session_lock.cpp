@@ -16,8 +16,10 @@ namespace docent::maps {
 namespace {
 
 using namespace std::chrono_literals;
-constexpr auto kLongestWait = 10s;  // An exchange replaces one map in a second or two.
+constexpr auto kLongestWait = 10s;  // Most replacements take a second or two.
 constexpr auto kBetweenAttempts = 50ms;
+// A session keeps its lock, while another process that wants to replace looks only for a moment.
+constexpr int kAttemptsBesideSessions = 3;
 
 // Whether the open file is still the one with this name: its last holder may have removed it.
 bool IsStillAt(int file, const std::filesystem::path& path) {
@@ -45,19 +47,27 @@ int TryLock(const std::filesystem::path& path, SessionLockKind kind) {
   }
 }
 
+// Whether those who hold the lock share it, and are therefore sessions.
+bool IsShared(const std::filesystem::path& path) {
+  const int file = TryLock(path, SessionLockKind::kSession);
+  if (file >= 0) close(file);
+  return file >= 0;
+}
+
 }  // namespace
 
 SessionLock::SessionLock(const std::filesystem::path& library, SessionLockKind kind)
     : path_(library.string() + ".session") {
   const auto end = std::chrono::steady_clock::now() + kLongestWait;
+  int shared = 0;
   while ((file_ = TryLock(path_, kind)) < 0) {
-    if (kind == SessionLockKind::kReplace)
+    if (kind == SessionLockKind::kReplace && IsShared(path_) && ++shared == kAttemptsBesideSessions)
       throw LibraryInSession(library.string() +
-                             " is open in docent author, which would save its maps over those of the hub; do "
-                             "it again when that session has ended");
+                             " is open in docent author, which could save its maps over the change; do it "
+                             "again when that session has ended");
     if (std::chrono::steady_clock::now() > end)
       throw Error(library.string() +
-                  " is being brought up to date from a hub; try again when that has ended");
+                  " is being changed by another command or from a hub; try again when that has ended");
     std::this_thread::sleep_for(kBetweenAttempts);
   }
 }

@@ -20,14 +20,14 @@ class LibraryInSession : public Error {
 // Who holds the lock.
 enum class SessionLockKind {
   kSession,  // An authoring session; several may run.
-  kReplace,  // An exchange with a hub, while it replaces maps.
+  kReplace,  // An exchange with a hub, or a command, while it replaces maps or their content.
 };
 
 // The lock, from its construction to its destruction. It may not be used by two threads at once.
 class SessionLock {
  public:
-  // Throws LibraryInSession if a session holds the lock and it is wanted for replacing. A session waits up to
-  // ten seconds for an exchange to end, and then throws docent::Error.
+  // Throws LibraryInSession if a session holds the lock and it is wanted for replacing. Waits up to ten
+  // seconds for a replacement to end, and then throws docent::Error.
   SessionLock(const std::filesystem::path& library, SessionLockKind kind);
   ~SessionLock();
   SessionLock(const SessionLock&) = delete;

@@ -4,8 +4,13 @@
 #include <gmock/gmock.h>
 #include <signal.h>
 
+#include <atomic>
 #include <chrono>
+#include <optional>
+#include <string>
 #include <thread>
+#include <utility>
+#include <vector>
 
 #include "tests/end_to_end/run_docent.h"
 #include "tests/hub/hub_samples.h"
@@ -99,6 +104,18 @@ TEST_F(HubSessionLock, TheProgramSaysThatASessionHasTheLibraryOpen) {
   EXPECT_EQ(during.exit_status, 1);
   EXPECT_THAT(during.output + during.errors, HasSubstr("'Desk' was not updated: "));
   EXPECT_THAT(during.output + during.errors, HasSubstr("is open in docent author"));
+  // The session would save the map as it knows it.
+  const std::vector<std::vector<std::string>> changes = {
+      {"content", "add", "--label", "A desk", "--map", "Desk", "--at", "0", "1", "2"},
+      {"content", "remove", "sign-1", "--map", "Desk"},
+      {"maps", "rename", "Desk", "Table"},
+      {"maps", "remove", "Desk"}};
+  for (std::vector<std::string> change : changes) {
+    change.insert(change.end(), {"--library", (folder_ / "b").string()});
+    const app::Outcome refused = app::RunDocent(change);
+    EXPECT_EQ(refused.exit_status, 1) << change[1];
+    EXPECT_THAT(refused.errors, HasSubstr("is open in docent author")) << change[1];
+  }
   kill(author, SIGKILL);  // A session that ended so leaves the file, but not the lock.
   int status = 0;
   waitpid(author, &status, 0);
@@ -122,6 +139,23 @@ TEST(SessionLock, SessionsShareItAndTheLastOneRemovesTheFile) {
   EXPECT_EQ(FilesIn(folder.path()), "");
   { const SessionLock replacing(library, SessionLockKind::kReplace); }
   EXPECT_EQ(FilesIn(folder.path()), "");
+}
+
+TEST(SessionLock, WhoReplacesWaitsForOthersWhoDo) {
+  const TemporaryFolder folder;
+  const std::filesystem::path library = folder / "m.docent";
+  std::optional<SessionLock> first(std::in_place, library, SessionLockKind::kReplace);
+  std::atomic<bool> has_ended = false;
+  std::thread other([&] {
+    std::this_thread::sleep_for(std::chrono::milliseconds(400));
+    has_ended = true;
+    first.reset();
+  });
+  EXPECT_NO_THROW({
+    const SessionLock second(library, SessionLockKind::kReplace);
+    EXPECT_TRUE(has_ended);
+  });
+  other.join();
 }
 
 }  // namespace
