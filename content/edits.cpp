@@ -15,6 +15,7 @@
 #include "content/placement.h"
 #include "content/warp.h"
 #include "engine/base/error.h"
+#include "engine/base/utf8.h"
 
 namespace docent::content {
 namespace {

@@ -236,10 +236,6 @@ struct SceneTally {
   std::string Add(const Entity& entity);
 };
 
-// Whether the bytes are valid UTF-8.
-bool IsUtf8(std::string_view text);
-// The beginning of a UTF-8 text that has at most max_bytes, which never ends within a character.
-std::string Shortened(const std::string& text, std::size_t max_bytes);
 // The base of an entity's name for a model's file: its name without folder and extension, in which bytes that
 // are not UTF-8 are replaced.
 std::string NameFromFile(const std::filesystem::path& file);

@@ -5,6 +5,7 @@
 #include "content/occluder.h"
 #include "content/scene.h"
 #include "content/warp.h"
+#include "engine/base/utf8.h"
 
 // Validate and TextBytes of scene.h.
 namespace docent::content {

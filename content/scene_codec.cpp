@@ -4,6 +4,7 @@
 #include <set>
 
 #include "engine/base/error.h"
+#include "engine/base/utf8.h"
 
 namespace docent::content {
 namespace {

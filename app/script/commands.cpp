@@ -8,6 +8,7 @@
 #include "content/occluder.h"
 #include "content/scene.h"
 #include "content/warp.h"
+#include "engine/base/utf8.h"
 #include "maps/library/library.h"
 
 namespace docent::app {
@@ -24,16 +25,11 @@ bool IsAtMost(double value, double most) {
 
 std::string NameProblem(const std::string& name, const char* what) {
   if (name.empty()) return std::string("expected ") + what + " that is not empty";
-  if (name.size() > content::kMaxTextBytes || !content::IsUtf8(name)) {
+  if (name.size() > content::kMaxTextBytes || !IsUtf8(name)) {
     return std::string("expected ") + what + " in UTF-8 with at most " +
            std::to_string(content::kMaxTextBytes) + " bytes";
   }
   return "";
-}
-
-std::string MapNameProblem(const std::string& name) {
-  if (!content::IsUtf8(name)) return "expected a map's name in UTF-8";
-  return maps::ValidateMapName(name);
 }
 
 std::string PixelProblem(const Eigen::Vector2d& pixel) {
@@ -131,13 +127,13 @@ std::string First(std::initializer_list<std::string> problems) {
 constexpr double kMinLength_m = 1e-3, kMaxLength_m = 1e3;
 
 struct Validator {
-  std::string operator()(const NewMap& c) const { return MapNameProblem(c.name); }
+  std::string operator()(const NewMap& c) const { return maps::ValidateMapName(c.name); }
   std::string operator()(const StopMap&) const { return ""; }
   // A map that was made by an earlier version may have a name that is not accepted for a new one.
   std::string operator()(const UseMap& c) const { return c.name.empty() ? kNoMapName : ""; }
   std::string operator()(const SetPolicy& c) const { return c.name.empty() ? kNoMapName : ""; }
   std::string operator()(const RenameMap& c) const {
-    return First({c.name.empty() ? kNoMapName : "", MapNameProblem(c.new_name)});
+    return First({c.name.empty() ? kNoMapName : "", maps::ValidateMapName(c.new_name)});
   }
   std::string operator()(const RemoveMap& c) const { return c.name.empty() ? kNoMapName : ""; }
   std::string operator()(const JoinMap& c) const { return c.name.empty() ? kNoMapName : ""; }
@@ -156,7 +152,7 @@ struct Validator {
   }
   std::string operator()(const PlaceSignpost& c) const {
     return First({NameProblem(c.text, "a signpost's text"), PixelProblem(c.pixel),
-                  c.to_map.empty() ? "" : MapNameProblem(c.to_map)});
+                  c.to_map.empty() ? "" : maps::ValidateMapName(c.to_map)});
   }
   std::string operator()(const PlaceLabel& c) const {
     return First({NameProblem(c.text, "a label's text"), PixelProblem(c.pixel),
@@ -254,12 +250,12 @@ struct Validator {
   }
   std::string operator()(const SetEntityText& c) const {
     if (!c.language.empty() && content::LanguageTag(c.language).empty())
-      return "'" + content::Shortened(c.language, content::kMaxLanguageBytes) + "' is not a language tag";
+      return "'" + Shortened(c.language, content::kMaxLanguageBytes) + "' is not a language tag";
     const bool removes = c.text.empty() && !c.language.empty();
     return First({NameProblem(c.name, "a name"), removes ? "" : NameProblem(c.text, "a text")});
   }
   std::string operator()(const SetSignpostTarget& c) const {
-    return First({NameProblem(c.name, "a name"), c.to_map.empty() ? "" : MapNameProblem(c.to_map)});
+    return First({NameProblem(c.name, "a name"), c.to_map.empty() ? "" : maps::ValidateMapName(c.to_map)});
   }
   std::string operator()(const SetSignpostDirection& c) const {
     return First({NameProblem(c.name, "a name"),

@@ -6,6 +6,8 @@
 #include <utility>
 
 #include "engine/base/error.h"
+#include "engine/base/utf8.h"
+#include "maps/library/library.h"
 
 namespace docent::app {
 
@@ -113,7 +115,8 @@ std::string SessionState::FreeMapName(const std::string& name) const {
       name.find_first_not_of("0123456789", space + 1) == std::string::npos)
     stem = name.substr(0, space);
   for (int number = 2;; ++number) {
-    const std::string candidate = stem + " " + std::to_string(number);
+    const std::string suffix = " " + std::to_string(number);
+    const std::string candidate = Shortened(stem, maps::kMaxMapNameBytes - suffix.size()) + suffix;
     const bool taken = std::any_of(maps.begin(), maps.end(), [&](const auto& entry) {
       return !entry.second.discarded && entry.second.name == candidate;
     });

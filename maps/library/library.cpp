@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "engine/base/error.h"
+#include "engine/base/utf8.h"
 #include "engine/vision/features.h"
 #include "maps/index/thumbnail_rows.h"
 #include "maps/index/word_rows.h"
@@ -31,6 +32,7 @@ namespace docent::maps {
 std::string ValidateMapName(const std::string& name) {
   const bool printable = std::none_of(
       name.begin(), name.end(), [](char c) { return static_cast<unsigned char>(c) < 0x20 || c == 0x7F; });
+  if (!IsUtf8(name)) return "a map's name must be valid UTF-8";
   if (!name.empty() && name.size() <= kMaxMapNameBytes && printable) return "";
   return "a map's name must have 1 to " + std::to_string(kMaxMapNameBytes) +
          " bytes and no control characters";

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "content/cards.h"
+#include "engine/base/utf8.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

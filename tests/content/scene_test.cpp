@@ -8,6 +8,7 @@
 #include "content/scene_codec.h"
 #include "content/warp.h"
 #include "engine/base/random.h"
+#include "engine/base/utf8.h"
 #include "tests/support/error_of.h"
 
 namespace docent::content {

@@ -1,13 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "app/session/session_state.h"
 
-#include <gtest/gtest.h>
+#include <gmock/gmock.h>
 
 #include <memory>
 #include <utility>
 
 #include "content/edits.h"
 #include "engine/base/error.h"
+#include "maps/library/library.h"
 
 namespace docent::app {
 namespace {
@@ -35,6 +36,17 @@ TEST(SessionState, ContinuesTheNumberOfAMapName) {
   EXPECT_EQ(state.FreeMapName("Hall"), "Hall 3");
   EXPECT_EQ(state.FreeMapName("Hall 2"), "Hall 3");
   EXPECT_EQ(state.FreeMapName("Room A4"), "Room A4 2");
+}
+
+TEST(SessionState, GivesNoMapANameThatALibraryRefuses) {
+  const SessionState state({});
+  std::string cyrillic;
+  for (int i = 0; i < 100; ++i) cyrillic += "\xD0\x97";
+  for (const std::string& longest : {std::string(200, 'x'), cyrillic}) {
+    ASSERT_EQ(maps::ValidateMapName(longest), "");
+    EXPECT_EQ(maps::ValidateMapName(state.FreeMapName(longest)), "");
+    EXPECT_THAT(state.FreeMapName(longest), testing::EndsWith(" 2"));
+  }
 }
 
 TEST(SessionState, FreesTheNameOfAMapThatWasDiscarded) {
