@@ -236,8 +236,8 @@ void Session::Finish() {
     }
     saving_.Flush();
     if (!failure) failure = saving_.TakeError();
-    if (const std::string lost = saving_.DescribeUnsaved(); failure && !lost.empty())
-      failure = WithSentence(failure, lost);
+    if (const std::string lost = saving_.DescribeUnsaved(); !lost.empty())
+      failure = failure ? WithSentence(failure, lost) : std::make_exception_ptr(Error(lost));
   }
   if (failure) std::rethrow_exception(failure);
 }

@@ -39,6 +39,9 @@ struct SessionMap {
   // from it, since signposts get the keys and names of their maps when they are read.
   std::uint64_t stored_scene = 0;
 
+  // Why its content could not be stored last; empty if it could.
+  std::string save_problem;
+
   // The mesh of its surfaces, behind which content is hidden; null while it is not known. It fits the
   // snapshot.
   std::shared_ptr<const engine::MapMesh> mesh;

@@ -69,7 +69,8 @@ void SessionMemory::AddLoadedMap(const maps::StoredMap& stored) {
   const std::scoped_lock lock(mutex_);
   for (const std::string& problem : problems) state_.AddEvent(state_.LastTime(), "warning", problem);
   assets_.Merge(&assets);
-  // A map that another process saved since the session began is not part of the session.
+  // A map that another process saved since the session began is not part of the session. A known one may have
+  // been removed while it was read.
   SessionMap* const known = state_.FindMap(stored.info.key);
   if (known == nullptr || !known->Exists() || known->changed) return;
   SessionMap& map = *known;

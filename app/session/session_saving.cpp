@@ -38,6 +38,25 @@ void SessionSaving::Start() {
       std::move(maintenance));
 }
 
+// Returns false, and says why once, if the content cannot be stored: a join of two maps may exceed a limit of
+// scenes, and the library of a stranger may have names that no scene may refer to.
+bool SessionSaving::AddContent(SessionMap* map, Timestamp time, maps::MapRecord* record) {
+  try {
+    record->scene = std::make_shared<maps::SceneRecord>(RecordFromScene(*map->scene));
+    record->history = std::make_shared<maps::SceneRecord>(RecordFromHistory(map->history, *map->scene));
+  } catch (const Error& error) {
+    submitted_.insert(map->key);
+    const std::string problem = "the map '" + map->name + "' cannot be saved: " + error.what();
+    if (std::exchange(map->save_problem, problem) == problem) return false;
+    state_.AddEvent(time, "warning", problem);
+    for (SessionCamera& camera : state_.cameras) camera.Advise(problem);
+    return false;
+  }
+  map->save_problem.clear();
+  map->stored_scene = maps::SceneTextChecksum(record->scene->text);
+  return true;
+}
+
 // Passes the changes of a map to the saver, which writes them in the background.
 void SessionSaving::SaveMap(SessionMap* map, Timestamp time) {
   if (!saver_ || discards_changes_ || !map->Exists() || !map->NeedsSave() ||
@@ -51,11 +70,7 @@ void SessionSaving::SaveMap(SessionMap* map, Timestamp time) {
   const bool structure = map->snapshot != map->saved_snapshot;
   const bool content = map->scene != map->saved_scene;
   if (structure) record.snapshot = map->snapshot;
-  if (content) {
-    record.scene = std::make_shared<maps::SceneRecord>(RecordFromScene(*map->scene));
-    record.history = std::make_shared<maps::SceneRecord>(RecordFromHistory(map->history, *map->scene));
-    map->stored_scene = maps::SceneTextChecksum(record.scene->text);
-  }
+  if (content && !AddContent(map, time, &record)) return;
   for (const engine::EstimatedLens& lens : system_.EstimatedLenses()) {
     if (lens.focal_sigma <= options_.mapper.lens.max_sigma)
       record.lenses.push_back({lens.name, *lens.model, lens.focal_sigma, lens.fixed});
@@ -165,6 +180,7 @@ std::string SessionSaving::DescribeUnsaved() const {
   for (const std::uint64_t key : submitted_) {
     const SessionMap* const map = state_.FindMap(key);
     if (map == nullptr || !map->Exists()) continue;
+    if (discards_changes_ && !map->save_problem.empty()) continue;
     names += (names.empty() ? "" : ", ") +
              std::string(IsInLibrary(key) ? "the last changes of the map '" : "the map '") + map->name + "'";
   }

@@ -72,6 +72,7 @@ class SessionSaving {
   std::exception_ptr TakeError();  // the first failure since it was last asked; null for none
 
  private:
+  bool AddContent(SessionMap* map, Timestamp time, maps::MapRecord* record);
   void OnSaved(const maps::MapRecord& record);  // on the saver's thread, without the mutex
   bool IsInLibrary(std::uint64_t key) const;
 
@@ -84,7 +85,7 @@ class SessionSaving {
   std::optional<Timestamp> last_save_;
   std::optional<std::chrono::steady_clock::time_point> saved_at_;  // for people only
   std::set<std::uint64_t>
-      submitted_;  // keys of the maps that the saver has not written since they were submitted
+      submitted_;  // keys of the maps that have not been written since they were submitted or refused
   bool discards_changes_ = false;
   IdleMaintenance maintenance_;       // accessed only by the saver's thread of maintenance
   std::optional<maps::Saver> saver_;  // last, because its thread calls back into the other members
