@@ -96,6 +96,8 @@ void MapCommands::Apply(const RemoveMap& command, const engine::TrackedFrame& fr
   if (!maps::MayRemove(map->policy)) {
     throw Error("the map '" + map->name + "' is " + maps::ToString(map->policy) + ": it cannot be removed");
   }
+  // The library may still have the maps that were joined into it.
+  if (!map->joined_keys.empty()) saving_.SaveMap(map, frame.frame.time);
   if (saving_.FlushToLibrary(map->key, command.name, frame.frame.time, lock)) library_->Remove(map->key);
   map->Discard();  // before the cameras leave the map, so that it is not saved again
   system_.RemoveMap(map->key);

@@ -252,6 +252,19 @@ TEST(LiveJoining, UndoRestoresNoSignpostThatLeadsToAMapThatWasJoined) {
   EXPECT_EQ(outcome.maps[0].scene->entities[0].signpost.to_key, 0u);
 }
 
+TEST(LiveJoining, WithAJoinedMapThePartsInTheLibraryAreRemoved) {
+  const TemporaryFolder folder;
+  maps::Library library =
+      maps::Library::Open(folder / "l.docent", maps::Access::kReadWrite, maps::CreateIfMissing::kYes);
+  const WayBack way;
+  const SourceRun outcome = RunInOrder(
+      Simulate("loop"), way.order, Pace::kLockstep, &library,
+      {BeforeFrame(way.second, NewMap{"Annex"}), BeforeFrame(way.asked - 2, Save{}),
+       BeforeFrame(way.asked, JoinMap{"Hall"}), BeforeFrame(way.order.size() - 1, RemoveMap{"Annex"})});
+  EXPECT_THAT(outcome.map_events, ::testing::Contains(HasSubstr("maps Annex and Hall were joined")));
+  EXPECT_THAT(library.List(), IsEmpty());
+}
+
 TEST(LiveJoining, SaysWhyMapsThatAPersonAskedForAreNotJoined) {
   const auto simulation = Simulate("desks:2");
   std::vector<int> order;
