@@ -115,17 +115,15 @@ const Bytes& ItemOf(const LocalMap& map, std::string_view item) {
 }
 
 // The identity of a library, which gets one if it has none.
-std::string IdentityOf(const Database& database) {
+LibraryIdentity IdentityOf(const Database& database) {
   {
     const Transaction transaction(database, Transaction::Kind::kRead);
-    if (const std::string identity = ReadLibraryIdentity(database); !identity.empty()) return identity;
+    if (LibraryIdentity identity = ReadLibraryIdentity(database); !identity.current.empty()) return identity;
   }
   Transaction transaction(database, Transaction::Kind::kWrite);
   // Another program may have given it one meanwhile.
-  std::string identity = ReadLibraryIdentity(database);
-  if (!identity.empty()) return identity;
-  identity = NewMapId();
-  WriteLibraryIdentity(database, identity);
+  if (ReadLibraryIdentity(database).current.empty()) RenewLibraryIdentity(database, NewMapId());
+  LibraryIdentity identity = ReadLibraryIdentity(database);
   transaction.Commit();
   return identity;
 }
@@ -144,6 +142,14 @@ LocalLibrary::LocalLibrary(const std::filesystem::path& path, CreateIfMissing cr
       database_(Database::OpenReadWrite(path, false)) {
   database_.StartWriting();
   identity_ = IdentityOf(database_);
+}
+
+const std::string& LocalLibrary::RenewIdentity() {
+  Transaction transaction(database_, Transaction::Kind::kWrite);
+  RenewLibraryIdentity(database_, NewMapId());
+  identity_ = ReadLibraryIdentity(database_);
+  transaction.Commit();
+  return identity_.current;
 }
 
 std::string LocalLibrary::StampOf(std::uint64_t key) const {

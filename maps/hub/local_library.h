@@ -11,6 +11,7 @@
 #include "maps/library/library.h"
 #include "maps/library/session_lock.h"
 #include "maps/storage/database.h"
+#include "maps/storage/library_identity.h"
 
 namespace docent::maps {
 
@@ -30,8 +31,10 @@ class LocalLibrary {
   // The same library with its own verbs.
   Library& library() { return library_; }
   const Library& library() const { return library_; }
-  // Tells this library from every other one (library_identity.h).
-  const std::string& identity() const { return identity_; }
+  // Tells this library from every other one, and from its older copies (library_identity.h).
+  const LibraryIdentity& identity() const { return identity_; }
+  // Gives it a new one, and returns that.
+  const std::string& RenewIdentity();
 
   // Keeps authoring sessions away while maps that they may have in memory are replaced. Throws
   // LibraryInSession if there is one.
@@ -61,7 +64,7 @@ class LocalLibrary {
   SceneTools scenes_;
   Library library_;  // Opened first: it upgrades older formats.
   Database database_;
-  std::string identity_;
+  LibraryIdentity identity_;
 };
 
 }  // namespace docent::maps

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <map>
 #include <thread>
+#include <utility>
 
 #include "maps/hub/restored_links.h"
 #include "maps/hub/sha256.h"
@@ -57,15 +58,21 @@ void SyncSession::CheckLinksAreOfThisLibrary() {
   const std::uint64_t next_key = local_.NextKey();
   const bool has_unknown_key =
       std::any_of(links_.begin(), links_.end(), [&](const MapLink& link) { return link.key >= next_key; });
-  if (!has_unknown_key && (library.empty() ? AreMapsAsOldAsLinksSay() : library == local_.identity())) {
-    if (library.empty()) state_.SetLibraryIdentity(local_.identity());
+  const LibraryIdentity& identity = local_.identity();
+  const bool is_of_this_library = library.empty()
+                                      ? AreMapsAsOldAsLinksSay()
+                                      : library == identity.current || library == identity.previous;
+  if (!has_unknown_key && is_of_this_library) {
+    if (library.empty()) state_.SetLibraryIdentity(identity.current);
     return;
   }
-  state_.StartAnew(local_.identity());
+  state_.StartAnew(identity.current);
   if (links_.empty()) return;
   links_.clear();
   Say(QuotedName(SyncStatePath(options_.library).string()) +
-      " was written for another library of this name, so that library and hub are compared anew");
+      " was written for another library of this name, or for a newer state of it, so that library and hub "
+      "are "
+      "compared anew");
 }
 
 bool SyncSession::AreMapsAsOldAsLinksSay() const {
@@ -97,15 +104,32 @@ const MapLink* SyncSession::LinkTo(const std::string& id) const {
   return FindIn(links_, [&](const MapLink& link) { return link.id == id; });
 }
 
+void SyncSession::RenewIdentity() {
+  if (std::exchange(has_new_identity_, true)) return;
+  state_.RenewLibraryIdentity([this] { return local_.RenewIdentity(); });
+}
+
 void SyncSession::PutLink(const MapLink& link) {
+  RenewIdentity();
   state_.Put(link);
   std::erase_if(links_, [&](const MapLink& old) { return old.key == link.key || old.id == link.id; });
   links_.push_back(link);
 }
 
 void SyncSession::RemoveLink(std::uint64_t key) {
+  RenewIdentity();
   state_.RemoveLink(key);
   std::erase_if(links_, [&](const MapLink& old) { return old.key == key; });
+}
+
+void SyncSession::PutTour(const TourLink& tour) {
+  RenewIdentity();
+  state_.Put(tour);
+}
+
+void SyncSession::RemoveTour(const std::string& name) {
+  RenewIdentity();
+  state_.RemoveTour(name);
 }
 
 Retarget SyncSession::ToHub() const {

@@ -55,6 +55,8 @@ class SyncSession {
   void PutLink(const MapLink& link);
   void RemoveLink(std::uint64_t key);
   const std::vector<MapLink>& links() const { return links_; }
+  void PutTour(const TourLink& tour);
+  void RemoveTour(const std::string& name);
 
   // Where the signposts of a map lead, from here to the hub and back.
   Retarget ToHub() const;
@@ -76,7 +78,10 @@ class SyncSession {
   std::set<std::string> NamesInUse() const;
 
  private:
-  // Removes the links if they were made for another library that had this name.
+  // Before the first change of a link, so that an older copy of the library is recognized later.
+  void RenewIdentity();
+  // Removes the links if they were made for another library that had this name, or for a newer state of this
+  // one.
   void CheckLinksAreOfThisLibrary();
   // Whether the maps here were created when the links say, as far as these say it. Only where the links do
   // not name their library: a map that is taken from the hub takes the time of the device that created it
@@ -92,6 +97,7 @@ class SyncSession {
   std::vector<HubRestoration> restorations_;
   std::vector<HubHead> heads_;
   std::vector<MapLink> links_;  // As stored, but for what the hub has lost (restored_links.h).
+  bool has_new_identity_ = false;
 };
 
 // The name as sentences have it.

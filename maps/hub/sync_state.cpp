@@ -174,6 +174,12 @@ void SyncState::SetLibraryIdentity(const std::string& identity) {
   database_.Prepare("UPDATE hub SET library = ?").Bind(1, identity).Run();
 }
 
+void SyncState::RenewLibraryIdentity(const std::function<std::string()>& renew) {
+  Transaction transaction(database_, Transaction::Kind::kWrite);
+  SetLibraryIdentity(renew());
+  transaction.Commit();
+}
+
 void SyncState::StartAnew(const std::string& identity) {
   Transaction transaction(database_, Transaction::Kind::kWrite);
   database_.Execute("DELETE FROM links");

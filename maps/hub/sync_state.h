@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <functional>
 #include <optional>
 #include <string>
 #include <vector>
@@ -57,9 +58,13 @@ class SyncState {
   void Put(const TourLink& tour);
   void RemoveTour(const std::string& name);
 
-  // LocalLibrary::identity of the library for which the links were made; empty if an older program made them.
+  // The identity of the library for which the links were made (library_identity.h); empty if an older program
+  // made them.
   std::string LibraryIdentity() const;
   void SetLibraryIdentity(const std::string& identity);
+  // Sets the one that `renew` gives the library. Two programs do so one after the other. If it is interrupted
+  // between the two files, this one has the previous identity of the library.
+  void RenewLibraryIdentity(const std::function<std::string()>& renew);
   // Removes all links of maps and tours, and sets the identity of the library for the next ones.
   void StartAnew(const std::string& identity);
 

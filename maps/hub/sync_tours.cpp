@@ -101,11 +101,11 @@ void PushTour(SyncSession* session, const Tour& tour, const std::vector<HubTour>
       base = 0;
     }
   } else if (on_hub != nullptr && !on_hub->removed) {
-    session->state().Put(TourLink{tour.name, base, content, session->hub().restoration()});
+    session->PutTour(TourLink{tour.name, base, content, session->hub().restoration()});
     return;
   }
   session->hub().SaveTour(*mine, base);
-  session->state().Put(TourLink{mine->name, base + 1, content, session->hub().restoration()});
+  session->PutTour(TourLink{mine->name, base + 1, content, session->hub().restoration()});
   session->Say("The tour '" + mine->name + "' was saved on the hub");
 }
 
@@ -124,7 +124,7 @@ void PullTour(SyncSession* session, const HubTour& theirs, const std::vector<Tou
   }
   if (theirs.removed) {
     if (here != nullptr && is_unchanged) ReplaceTour(session, theirs.name, nullptr);
-    if (link != nullptr) session->state().RemoveTour(theirs.name);
+    if (link != nullptr) session->RemoveTour(theirs.name);
     return;
   }
   const bool is_equal = here != nullptr && content == ContentOf(theirs);
@@ -138,8 +138,8 @@ void PullTour(SyncSession* session, const HubTour& theirs, const std::vector<Tou
     session->Say("The tour '" + theirs.name + "' was updated");
   }
   const std::optional<HubTour> written = ForHub(*session, wanted);
-  session->state().Put(TourLink{theirs.name, theirs.revision, written ? ContentOf(*written) : "",
-                                session->hub().restoration()});
+  session->PutTour(TourLink{theirs.name, theirs.revision, written ? ContentOf(*written) : "",
+                            session->hub().restoration()});
 }
 
 }  // namespace
@@ -165,7 +165,7 @@ void PushTours(SyncSession* session) {
     HubTour removed = *on_hub;
     removed.removed = true;
     session->hub().SaveTour(removed, on_hub->revision);
-    session->state().RemoveTour(link.name);
+    session->RemoveTour(link.name);
     session->Say("The tour '" + link.name + "' was removed from the hub");
   }
 }

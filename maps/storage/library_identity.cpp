@@ -14,25 +14,32 @@ constexpr std::string_view kIdentityPrefix = "library ";
 
 }  // namespace
 
-std::string ReadLibraryIdentity(const Database& database) {
+LibraryIdentity ReadLibraryIdentity(const Database& database) {
   Statement query = database.Prepare(
       "SELECT camera, data, checksum FROM lenses WHERE camera GLOB 'library *' ORDER BY camera");
+  LibraryIdentity identity;
   while (query.Step()) {
     const std::string camera = query.Text(0);
     const Bytes data(query.Blob(1).begin(), query.Blob(1).end());
     const std::int64_t checksum = query.Integer(2);
     try {
-      if (IsLibraryIdentity(CheckedLens(camera, data, checksum)))
-        return camera.substr(kIdentityPrefix.size());
+      const StoredLens lens = CheckedLens(camera, data, checksum);
+      if (!IsLibraryIdentity(lens)) continue;
+      (lens.fixed ? identity.current : identity.previous) = camera.substr(kIdentityPrefix.size());
     } catch (const Error&) {
       continue;  // ReadLenses reports it.
     }
   }
-  return "";
+  return identity;
 }
 
-void WriteLibraryIdentity(const Database& database, const std::string& identity) {
-  WriteLens(database, {std::string(kIdentityPrefix) + identity, engine::CameraModel(), 1, true});
+void RenewLibraryIdentity(const Database& database, const std::string& identity) {
+  const LibraryIdentity before = ReadLibraryIdentity(database);
+  const auto name = [](const std::string& text) { return std::string(kIdentityPrefix) + text; };
+  if (!before.previous.empty())
+    database.Prepare("DELETE FROM lenses WHERE camera = ?").Bind(1, name(before.previous)).Run();
+  if (!before.current.empty()) WriteLens(database, {name(before.current), engine::CameraModel(), 1, false});
+  WriteLens(database, {name(identity), engine::CameraModel(), 1, true});
 }
 
 bool IsLibraryIdentity(const StoredLens& lens) {

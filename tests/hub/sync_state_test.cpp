@@ -172,6 +172,36 @@ TEST_F(HubState, AFileBesideANewLibraryIsNotUsed) {
   EXPECT_EQ(NamesIn(OpenSampleLibrary(folder_ / "a")), all);
 }
 
+TEST_F(HubState, AFileBesideAnOlderCopyOfItsLibraryIsNotUsed) {
+  const std::filesystem::path file = folder_ / "a", copy = folder_ / "copy";
+  {
+    Library a = OpenSampleLibrary(file);
+    AddSampleMap(&a, "Desk", 7);
+  }
+  Push(SampleSync(Url(), file));
+  std::filesystem::copy_file(file, copy);
+  AddSign("a", "sign-2", "newer");
+  {
+    Library a = OpenSampleLibrary(file);
+    AddSampleMap(&a, "Foo", 8);
+  }
+  Push(SampleSync(Url(), file));
+  std::filesystem::copy_file(copy, file, std::filesystem::copy_options::overwrite_existing);
+  {
+    Library a = OpenSampleLibrary(file);
+    AddSampleMap(&a, "Bar", 9);  // With the key that Foo had.
+  }
+  EXPECT_THAT(LinesOf(Push(SampleSync(Url(), file))), HasSubstr("or for a newer state of it"));
+  EXPECT_EQ(Pull(SampleSync(Url(), file)).problems, 0);
+  Pull(SampleSync(Url(), folder_ / "b"));
+  // What differs is kept twice.
+  EXPECT_EQ(NamesIn(OpenSampleLibrary(folder_ / "b")), "Bar,Desk,Desk (2),Foo");
+  EXPECT_EQ(NamesIn(OpenSampleLibrary(file)), "Bar,Desk,Desk (2),Foo");
+  EXPECT_THAT(AllTexts("b"), HasSubstr("newer")) << "the older copy does not count as a change";
+  EXPECT_THAT(AllTexts("a"), HasSubstr("newer"));
+  EXPECT_THAT(Push(SampleSync(Url(), file)).lines, IsEmpty()) << "it is told once";
+}
+
 TEST_F(HubState, AFileBesideANewLibraryThatHasOnlyReservedKeysRemovesNothing) {
   {
     Library a = OpenSampleLibrary(folder_ / "a");

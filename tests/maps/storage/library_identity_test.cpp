@@ -14,7 +14,7 @@ namespace {
 using ::testing::ElementsAre;
 using ::testing::IsEmpty;
 
-class LibraryIdentity : public ::testing::Test {
+class LibraryIdentityRows : public ::testing::Test {
  protected:
   void SetUp() override {
     Library library = OpenToWrite(file_);
@@ -23,10 +23,10 @@ class LibraryIdentity : public ::testing::Test {
     library.Save(record);
   }
   static std::string Read(const std::filesystem::path& file) {
-    return ReadLibraryIdentity(Database::OpenReadOnly(file));
+    return ReadLibraryIdentity(Database::OpenReadOnly(file)).current;
   }
   void Write(const std::string& identity) {
-    WriteLibraryIdentity(Database::OpenReadWrite(file_, false), identity);
+    RenewLibraryIdentity(Database::OpenReadWrite(file_, false), identity);
   }
 
   TemporaryFolder folder_;
@@ -38,7 +38,7 @@ class LibraryIdentity : public ::testing::Test {
                          0.01, false};
 };
 
-TEST_F(LibraryIdentity, IsReadAsWrittenAndCopiedWithTheFile) {
+TEST_F(LibraryIdentityRows, IsReadAsWrittenAndCopiedWithTheFile) {
   EXPECT_EQ(Read(file_), "");
   Write("one");
   EXPECT_EQ(Read(file_), "one");
@@ -46,20 +46,29 @@ TEST_F(LibraryIdentity, IsReadAsWrittenAndCopiedWithTheFile) {
   EXPECT_EQ(Read(folder_ / "copy.docent"), "one");
 }
 
-TEST_F(LibraryIdentity, IsNoLensAndNoDamage) {
+TEST_F(LibraryIdentityRows, OnlyThePreviousOneIsKeptBesideIt) {
+  for (const char* identity : {"three", "one", "two"}) Write(identity);
+  const LibraryIdentity read = ReadLibraryIdentity(Database::OpenReadOnly(file_));
+  EXPECT_EQ(read.current, "two");
+  EXPECT_EQ(read.previous, "one");
+  EXPECT_EQ(Database::OpenReadOnly(file_).Number("SELECT count(*) FROM lenses"), 3) << "with the camera";
+}
+
+TEST_F(LibraryIdentityRows, IsNoLensAndNoDamage) {
   Write("one");
+  Write("two");
   const Library library = OpenToRead(file_);
   EXPECT_THAT(library.Lenses(), ElementsAre(lens_));
   EXPECT_THAT(library.Verify(), IsEmpty());
 }
 
-TEST_F(LibraryIdentity, DoesNotCountIfDamaged) {
+TEST_F(LibraryIdentityRows, DoesNotCountIfDamaged) {
   Write("one");
   RunSql(file_, "UPDATE lenses SET camera = 'library two' WHERE camera = 'library one'");
   EXPECT_EQ(Read(file_), "");
 }
 
-TEST_F(LibraryIdentity, IsNotRecovered) {
+TEST_F(LibraryIdentityRows, IsNotRecovered) {
   Write("one");
   const auto saved = folder_ / "saved.docent";
   EXPECT_THAT(Recover(file_, saved).problems, IsEmpty());
