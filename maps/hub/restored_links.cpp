@@ -34,13 +34,27 @@ std::int64_t NewestKept(const std::vector<HubRestoration>& restorations, const s
   return newest;
 }
 
+// The revision that the hub had after the last restoration; 0 if it had none.
+std::int64_t NotedLast(const std::vector<HubRestoration>& restorations, RevisionsOf revisions,
+                       const std::string& name) {
+  if (restorations.empty()) return 0;
+  const auto& noted = restorations.back().*revisions;
+  const auto found = noted.find(name);
+  return found == noted.end() ? 0 : found->second;
+}
+
 // What of a link still holds.
 enum class Holds { kAll, kOlderRevision, kRevisionOnly, kNothing };
 
-Holds WhatHolds(std::int64_t revision, std::int64_t kept, std::int64_t on_hub, bool may_save) {
+// noted: see NotedLast.
+Holds WhatHolds(std::int64_t revision, std::int64_t kept, std::int64_t on_hub, std::int64_t noted,
+                bool may_save) {
   if (revision <= std::min(kept, on_hub)) return Holds::kAll;
   if (on_hub <= kept) return Holds::kOlderRevision;
-  return may_save ? Holds::kNothing : Holds::kRevisionOnly;
+  if (may_save) return Holds::kNothing;
+  // A backup that was made before the restoration of the link says nothing of it. If nobody has saved since,
+  // the hub's state is an older one.
+  return on_hub > noted ? Holds::kRevisionOnly : Holds::kOlderRevision;
 }
 
 // No map has this state, so that it counts as changed.
@@ -61,7 +75,8 @@ std::vector<std::uint64_t> ForgetLostRevisions(const std::vector<HubRestoration>
         std::find_if(heads.begin(), heads.end(), [&](const HubHead& other) { return other.id == link.id; });
     if (link.revision == 0 || head == heads.end()) continue;
     const std::int64_t kept = NewestKept(restorations, link.restoration, &HubRestoration::maps, link.id);
-    switch (WhatHolds(link.revision, kept, head->revision, may_save)) {
+    const std::int64_t noted = NotedLast(restorations, &HubRestoration::maps, link.id);
+    switch (WhatHolds(link.revision, kept, head->revision, noted, may_save)) {
       case Holds::kAll:
         break;
       case Holds::kOlderRevision:
@@ -90,7 +105,8 @@ void ForgetLostRevisions(const std::vector<HubRestoration>& restorations, const 
                                    [&](const HubTour& other) { return other.name == link.name; });
     if (tour == tours.end()) continue;
     const std::int64_t kept = NewestKept(restorations, link.restoration, &HubRestoration::tours, link.name);
-    const Holds holds = WhatHolds(link.revision, kept, tour->revision, may_save);
+    const std::int64_t noted = NotedLast(restorations, &HubRestoration::tours, link.name);
+    const Holds holds = WhatHolds(link.revision, kept, tour->revision, noted, may_save);
     if (holds == Holds::kOlderRevision) {
       link.revision = tour->revision;
       link.content = "lost";  // No tour has this content, so that it counts as changed.

@@ -73,6 +73,10 @@ TEST(RestoredLinks, EachLaterRestorationCounts) {
   EXPECT_EQ(Remaining(both, LinkAt(9, "second"), 9), "9");
   EXPECT_EQ(Remaining({RestoredAt("second", 8)}, LinkAt(6, "first"), 8), "0 changed")
       << "the backup was made before the first one";
+  EXPECT_EQ(Remaining({RestoredAt("second", 8)}, LinkAt(9, "first"), 8, false), "8 changed")
+      << "nobody has saved since, so that the hub's state is an older one";
+  EXPECT_EQ(Remaining({RestoredAt("second", 8)}, LinkAt(9, "first"), 9, false), "10")
+      << "a visitor takes what others have saved since";
 }
 
 TEST(RestoredLinks, ToursFollowTheSameRules) {
