@@ -59,6 +59,15 @@ class NewGroups {
   std::map<std::string, std::string> by_name_, by_form_;
 };
 
+// Whether a group of mine and one of theirs are the same if both have the same entity: they have one name, or
+// theirs has the one that an earlier merge gave to mine.
+bool IsSameGroup(const std::string& mine, const std::string& their, const Scene& theirs) {
+  if (their == mine) return true;
+  const std::string stem = mine + "-";
+  return their.starts_with(stem) && their.size() > stem.size() &&
+         their.find_first_not_of("0123456789", stem.size()) == std::string::npos && HasGroup(theirs, mine);
+}
+
 // My scene, in which a new group has the name of a group of theirs only if both sides have put the same
 // entity into it: authors who do not know of each other choose the same names for their groups.
 Scene WithGroupsApart(const Scene& base, Scene mine, const Scene& theirs) {
@@ -66,7 +75,8 @@ Scene WithGroupsApart(const Scene& base, Scene mine, const Scene& theirs) {
   std::map<std::string, std::string> names;  // By the name that I have given.
   for (const Entity& my : mine.entities) {
     if (!new_groups.IsNew(my.group) || names.contains(my.group)) continue;
-    if (const std::string* const their = new_groups.Find(my)) names[my.group] = *their;
+    const std::string* const their = new_groups.Find(my);
+    if (their != nullptr && IsSameGroup(my.group, *their, theirs)) names[my.group] = *their;
   }
   const auto is_taken = [&](const std::string& name) {
     return HasGroup(base, name) || HasGroup(mine, name) || HasGroup(theirs, name) ||

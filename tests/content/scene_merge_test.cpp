@@ -87,6 +87,17 @@ TEST(SceneMerge, KeepsGroupsOfNewEntitiesOfTheSameNamesApart) {
   EXPECT_EQ(GroupsOf(MergeScenes({}, mine, merge.scene).scene), GroupsOf(merge.scene));
 }
 
+TEST(SceneMerge, DoesNotUniteGroupsThatTheOtherSideHasUnited) {
+  const Scene base{{SignOf("a", "1"), SignOf("b", "b"), SignOf("x", "1"), SignOf("y", "1")}};
+  const Scene mine{
+      {SignIn("group-1", "a"), SignIn("group-2", "b", "b"), SignIn("group-1", "x"), SignIn("group-2", "y")}};
+  const Scene theirs{
+      {SignIn("group-1", "a"), SignIn("group-1", "b", "b"), SignOf("x", "1"), SignOf("y", "1")}};
+  const SceneMerge merge = MergeScenes(base, mine, theirs);
+  EXPECT_EQ(GroupsOf(merge.scene), "a:group-1 b:group-1 x:group-1 y:group-2 b-2:group-2");
+  EXPECT_EQ(merge.conflicts.size(), 1u) << "of b";
+}
+
 TEST(SceneMerge, LeavesGroupsThatBothSidesHave) {
   // Before, or since.
   const Scene base{{SignIn("group-1", "a"), SignOf("b", "1"), SignOf("c", "1"), SignOf("d", "1")}};
