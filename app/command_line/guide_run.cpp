@@ -197,6 +197,11 @@ std::shared_ptr<const ShownFrame> GuideRun::Lead(std::size_t camera, const Guide
   return visitor_frames_.OverNewest(std::move(frame));
 }
 
+void GuideRun::Used() {
+  const std::scoped_lock lock(files_mutex_);
+  if (host_) host_->Use();
+}
+
 void GuideRun::HandleUntracked(const engine::Frame& image, const Show& show) {
   std::shared_ptr<ShownFrame> frame;
   {

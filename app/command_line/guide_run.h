@@ -42,6 +42,8 @@ class GuideRun {
   void Reached(FrameStage stage, const ShownFrame& frame);
   // See WindowLink::lead.
   std::shared_ptr<const ShownFrame> Lead(std::size_t camera, const GuideVisitor& guide);
+  // See WindowLink::used.
+  void Used();
   // Adds to the events what the window does about the machine's load.
   void Adapted(const std::string& text) { session_.AddEvent("load", text); }
   std::span<CommandInbox> inboxes() { return inboxes_; }

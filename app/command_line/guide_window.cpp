@@ -393,6 +393,8 @@ class GuideWindow {
       if (controls_) {
         controls_->Handle(event);
       } else if (visitor_) {
+        using Kind = ui::InputEvent::Kind;
+        if (event.kind != Kind::kResize && event.kind != Kind::kClose) link_.used();
         visitor_->Handle(event, std::chrono::steady_clock::now());
       }
     }

@@ -31,6 +31,8 @@ struct WindowLink {
   // On a tour: carries out a step of the visitor at once, also while an image is tracked, and returns the
   // last frame of this camera with what has changed; null before the first frame and after the last one.
   std::function<std::shared_ptr<const ShownFrame>(std::size_t, const GuideVisitor&)> lead;
+  // On a tour: called when a button or a key is pressed or released, whatever that does.
+  std::function<void()> used;
   // Called with what has changed in drawing because of the machine's load, for the log.
   std::function<void(const std::string&)> adapted;
   // Called with each frame that the window shows, at the end of each stage but tracking.

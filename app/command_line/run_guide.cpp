@@ -112,6 +112,7 @@ void RunWindowed(const GuideRequest& request, std::span<CalibratedCamera> camera
     link.toggle_pause = [run] { run->TogglePause(); };
     link.toggle_fast_forward = [run] { run->ToggleFastForward(); };
     link.lead = [run](std::size_t camera, const GuideVisitor& guide) { return run->Lead(camera, guide); };
+    link.used = [run] { run->Used(); };
     link.adapted = [run](const std::string& text) { run->Adapted(text); };
     link.reached = [run](FrameStage stage, const ShownFrame& frame) { run->Reached(stage, frame); };
     ShowInWindow(request, cameras, &slot, link);

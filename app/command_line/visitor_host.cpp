@@ -93,10 +93,7 @@ void VisitorHost::AddQuestion(ShownFrame* frame) {
 
 void VisitorHost::Guide(std::size_t index, const engine::CameraModel& camera,
                         const std::shared_ptr<ShownFrame>& frame) {
-  if (index == 0) {
-    guided_s_ = frame->seconds;
-    WatchForNextVisitor(*frame);
-  }
+  if (index == 0) WatchForNextVisitor(*frame);
   GuideAgain(index, camera, frame);
   if (index != 0 || !visits_) return;
   // These images belong to no visit: neither to that of the visitor who has left nor to the next one.
@@ -119,7 +116,7 @@ bool VisitorHost::Lead(const Command& command, const engine::TrackedFrame& frame
   const auto* const guide = std::get_if<GuideVisitor>(&command);
   if (guide == nullptr) return false;
   const auto index = static_cast<std::size_t>(frame.frame.camera);
-  if (left_tour_ && index == 0) left_tour_->Use(guided_s_);
+  Use();
   if (visitors_[index]->cards()->Do(*guide)) {
     report_({frame.frame.time, "command", FormatCommand(command)});
     ReportCards(index, frame.frame.time);
@@ -141,6 +138,10 @@ bool VisitorHost::Lead(const Command& command, const engine::TrackedFrame& frame
   report_({frame.frame.time, "command", FormatCommand(command)});
   ReportRoute(frame.frame.time);
   return true;
+}
+
+void VisitorHost::Use() {
+  if (left_tour_) left_tour_->Use();
 }
 
 void VisitorHost::Finish() {

@@ -35,6 +35,8 @@ class VisitorHost {
   // Carries out a command that leads the visitor, and returns true; false for any other command. Throws Error
   // when it cannot be carried out.
   bool Lead(const Command& command, const engine::TrackedFrame& frame);
+  // Somebody touched the device or pressed a key, whatever that does.
+  void Use();
   // The sounds of the cards that the first camera's visitor has opened since the last call: their map and
   // their names.
   std::vector<SoundDirector::Key> TakeAskedSounds() { return std::exchange(asked_sounds_, {}); }
@@ -64,7 +66,6 @@ class VisitorHost {
   std::optional<Speech> speech_;
   std::optional<LeftTour> left_tour_;  // Of the first camera; only of a kiosk, and of a tour with stops.
   std::optional<VisitKeeper> visits_;  // Of the first camera; only with a folder for their records.
-  double guided_s_ = 0;                // Of the first camera's last image.
   int visitors_before_ = 0;            // See ShownFrame.
   std::vector<SoundDirector::Key> asked_sounds_;
 };

@@ -15,7 +15,9 @@ bool IdleWatch::Update(double seconds, const cv::Mat& image) {
   cv::resize(image, small, {kWidth, kHeight}, 0, 0, cv::INTER_AREA);
   if (small.channels() == 3) cv::cvtColor(small, small, cv::COLOR_BGR2GRAY);
   const double pixels = kWidth * kHeight;
-  const double pause_s = reference_.empty() ? 0 : seconds - last_s_;
+  const bool is_used = std::exchange(is_used_, false);
+  const double pause_s = reference_.empty() || is_used ? 0 : seconds - last_s_;
+  if (is_used) changed_s_ = seconds;
   last_s_ = seconds;
   if (reference_.empty() || cv::norm(small, reference_, cv::NORM_L1) / pixels > kChange) {
     reference_ = small;

@@ -15,9 +15,9 @@ class IdleWatch {
   // An image (CV_8UC1 or CV_8UC3, not empty) and its time in seconds, which does not decrease. Returns true
   // once when the device has been left, and not again before it is used.
   bool Update(double seconds, const cv::Mat& image);
-  // Somebody did something with the device, at the time of the last image.
-  void Use(double seconds) {
-    changed_s_ = seconds;
+  // Somebody did something with the device since the last image; there may be none for a long time.
+  void Use() {
+    is_used_ = true;
     is_left_ = false;
   }
   // Whether the device is left at present.
@@ -28,6 +28,7 @@ class IdleWatch {
   cv::Mat reference_;     // Small and grey, of the last change of the image.
   double changed_s_ = 0;  // Its time, or when the device was used since.
   double last_s_ = 0;     // Of the last image.
+  bool is_used_ = false;  // Since the last image.
   bool is_left_ = false;
 };
 

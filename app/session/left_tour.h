@@ -23,9 +23,9 @@ class LeftTour {
   // An image (as for IdleWatch) and its time in seconds, which does not decrease. `is_begun`: the next
   // visitor would take something over. Returns true when the tour is to begin anew.
   bool Update(double seconds, const cv::Mat& image, bool is_begun);
-  // The visitor did something with the device, by touch or keys, at the time of the last image. Where the
-  // camera is fixed, its image does not tell.
-  void Use(double seconds) { idle_watch_.Use(seconds); }
+  // The visitor did something with the device, by touch or keys. Where the camera is fixed, its image does
+  // not tell.
+  void Use() { idle_watch_.Use(); }
   // Whether the visitor is to be asked at present.
   bool is_asking() const { return asked_s_.has_value(); }
   // Whether nobody uses the device, or its visitor has yet to say whether the tour goes on.

@@ -27,7 +27,7 @@ class KioskOnAStand : public ::testing::Test {
     request_.tour = "Highlights";
     request_.route.emplace();
     request_.route->stops = {{1, "Desk"}, {2, "Door"}, {3, "Window"}};
-    host_.emplace(request_, &session_, 1, [](const Event&) {});
+    host_.emplace(request_, &session_, 2, [](const Event&) {});
   }
   void Stand(int duration_s) {
     for (int i = 0; i < duration_s; ++i, ++now_s_) {
@@ -66,7 +66,20 @@ TEST_F(KioskOnAStand, RecordsTheVisitOfWhoOnlyTouchesIt) {
   Stand(200);
   // The first one is counted from the start until nobody was there for two minutes.
   EXPECT_THAT(Visits(), UnorderedElementsAre(Field(&VisitRecord::duration_s, DoubleEq(119)),
-                                             Field(&VisitRecord::duration_s, DoubleEq(218))));
+                                             Field(&VisitRecord::duration_s, DoubleEq(219))));
+}
+
+TEST_F(KioskOnAStand, IsUsedByWhoTouchesTheSecondCamerasImageOrNothingThatLeads) {
+  for (int i = 0; i < 3; ++i) {
+    Stand(100);
+    engine::TrackedFrame second;
+    second.frame.camera = 1;
+    host_->Lead(GuideVisitor{i % 2 == 0 ? GuideVisitor::Step::kSkip : GuideVisitor::Step::kBack, {}}, second);
+    Stand(100);
+    host_->Use();  // Such as by turning the model of a card.
+  }
+  Stand(1);
+  EXPECT_EQ(frame_->visitors_before, 0);
 }
 
 TEST_F(KioskOnAStand, DoesNotBeginAnewWhileItIsTouched) {

@@ -90,24 +90,35 @@ TEST(LeftTour, IsNotLeftByWhoUsesTheDeviceUnseen) {
   Device kiosk(false);
   for (int i = 0; i < 5; ++i) {
     EXPECT_EQ(kiosk.Lie(250), 0);
-    kiosk.tour.Use(kiosk.now_s - 1);
+    kiosk.tour.Use();
   }
   EXPECT_EQ(kiosk.Lie(299), 0);
   EXPECT_EQ(kiosk.Lie(100), 1);
   EXPECT_TRUE(kiosk.tour.is_between_visits());
-  kiosk.tour.Use(kiosk.now_s - 1);
+  kiosk.tour.Use();
   EXPECT_FALSE(kiosk.tour.is_between_visits()) << "somebody is there again";
+}
+
+TEST(LeftTour, IsNotLeftByWhoUsesTheDeviceWhileThereAreNoImages) {
+  for (const bool is_carried : {false, true}) {
+    Device kiosk(false);
+    kiosk.BeCarried(100);
+    kiosk.now_s += 1001;  // The camera was unplugged.
+    kiosk.tour.Use();
+    EXPECT_EQ(kiosk.Pass(50, is_carried), 0) << is_carried;
+    EXPECT_FALSE(kiosk.tour.is_between_visits());
+  }
 }
 
 TEST(LeftTour, AsksWhoeverUsesADeviceThatWasLeftUnlessThatIsTheAnswer) {
   Device device(true);
   device.Lie(400);
-  device.tour.Use(device.now_s - 1);
+  device.tour.Use();
   EXPECT_EQ(device.Lie(10), 0);
   EXPECT_TRUE(device.tour.is_asking());
   device.tour.Answer();
   device.Lie(400);
-  device.tour.Use(device.now_s - 1);  // The menu says whether the tour goes on.
+  device.tour.Use();  // The menu says whether the tour goes on.
   device.tour.Answer();
   EXPECT_EQ(device.Lie(10), 0);
   EXPECT_FALSE(device.tour.is_asking());
