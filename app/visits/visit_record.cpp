@@ -9,9 +9,15 @@ std::optional<VisitRecord> VisitRecorder::Add(std::chrono::sys_seconds now, doub
                                               const std::string& map, const Eigen::Vector3d& place) {
   std::optional<VisitRecord> ended;
   if (visit_ && last_pose_s_ && seconds - begin_s_ - *last_pose_s_ >= limits_.idle_s) ended = Finish();
+  if (visit_ && !last_pose_s_ && seconds - begin_s_ >= limits_.idle_s) {
+    // Nothing was recognized at all: the device waits for its first visitor.
+    visit_.reset();
+    is_unused_ = true;
+  }
   if (!visit_) {
     // The images of a device that was put down are nobody's.
-    if (map.empty() && last_pose_s_) return ended;
+    if (map.empty() && (last_pose_s_ || is_unused_)) return ended;
+    is_unused_ = false;
     visit_.emplace();
     visit_->begin = now;
     begin_s_ = seconds;

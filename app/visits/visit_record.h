@@ -49,7 +49,7 @@ struct VisitRecord {
 };
 
 // Makes the records of one camera's visits from its images. A visit ends when nothing is recognized for two
-// minutes; the next one begins with the next pose. One thread.
+// minutes, and is none if nothing was recognized before; the next one begins with the next pose. One thread.
 class VisitRecorder {
  public:
   // Design choices.
@@ -82,6 +82,7 @@ class VisitRecorder {
   std::optional<VisitRecord> visit_;
   double begin_s_ = 0;                               // Of the visit, on the clock of Add.
   std::optional<double> last_pose_s_, last_step_s_;  // From begin_s_.
+  bool is_unused_ = false;                           // No visit yet, since nothing was recognized.
   std::string last_map_;
   Eigen::Vector3d last_place_ = Eigen::Vector3d::Zero();
 };

@@ -89,6 +89,20 @@ TEST(VisitRecorder, BeginsTheNextVisitAfterTwoMinutesWithoutAPose) {
   EXPECT_EQ(next->stays.front().begin_s, 0);
 }
 
+TEST(VisitRecorder, ADeviceThatWaitsForItsFirstVisitorHasNone) {
+  Walker walker;
+  walker.In("", 7200);
+  EXPECT_FALSE(walker.recorder.Finish());
+  walker.In("", 10);
+  walker.In("Lions", 20);
+  EXPECT_THAT(walker.ended, IsEmpty());
+  const auto visit = walker.recorder.Finish();
+  ASSERT_TRUE(visit);
+  EXPECT_EQ(visit->begin, kNoon + std::chrono::seconds(7210));
+  EXPECT_EQ(visit->images, 200u);
+  EXPECT_NEAR(visit->duration_s, 19.9, 1e-9);
+}
+
 TEST(VisitRecorder, StaysWithinItsLimits) {
   VisitRecorder::Limits limits;
   limits.stays = limits.losses = 5;
