@@ -13,10 +13,10 @@
 #include "app/files/write_confinement.h"
 #include "app/script/script_file.h"
 #include "app/session/library_scene.h"
+#include "app/session/tour_route.h"
 #include "engine/base/error.h"
 #include "engine/initialization/planar_target.h"
 #include "maps/hub/hub_connection.h"
-#include "maps/library/map_copies.h"
 #include "maps/library/session_lock.h"
 
 namespace docent::app {
@@ -54,28 +54,6 @@ maps::Tour FindTour(const maps::Library& library, const std::string& name) {
     throw Error("The tour '" + name + "' has no stops; add some with docent maps tour edit.");
   }
   throw Error("'" + library.file() + "' has no tour named '" + name + "'.");
-}
-
-// Of maps that are copies of each other, the newest one counts, as for the session.
-Route RouteOf(const maps::Library& library, const maps::Tour& tour) {
-  const std::vector<maps::MapCopy> copies = maps::FindCopies(library);
-  const auto replaced = maps::ReplacedByCopies(copies);
-  const auto names = maps::NamesForVisitors(library.List(), copies);
-  const auto shown = [&](std::uint64_t key) {
-    const auto copy = replaced.find(key);
-    return copy == replaced.end() ? key : copy->second;
-  };
-  Route route;
-  route.minutes = tour.minutes;
-  for (const std::uint64_t stop : tour.stops) {
-    const std::uint64_t key = shown(stop);
-    const std::string name = library.Find(key).name;
-    const auto told = names.find(name);
-    route.stops.push_back({key, told == names.end() ? name : told->second});
-  }
-  for (const maps::Library::Signpost& signpost : library.Signposts())
-    route.signposts.Add(shown(signpost.map.key), shown(signpost.to_key));
-  return route;
 }
 
 void ReadScriptFor(const std::filesystem::path& path, GuideRequest* request) {
