@@ -18,17 +18,24 @@
 namespace docent::app {
 
 std::shared_ptr<const content::Asset> ModelPreviews::Get(const std::string& file) {
+  if (file.empty()) return nullptr;
+  std::filesystem::path path = folder_ / file;
+  std::error_code error;
+  if (!std::filesystem::exists(path, error)) path = file;
+  const FileStamp stamp = StampOf(path);
+  std::shared_ptr<const content::Asset> before;
   {
     const std::scoped_lock lock(mutex_);
-    if (const auto found = read_.find(file); found != read_.end()) return found->second.asset;
+    if (const auto found = read_.find(file); found != read_.end()) {
+      before = found->second.asset;
+      if (found->second.stamp == stamp) return before;
+    }
   }
-  if (file.empty() || (worker_ && !worker_->finished())) return nullptr;
-  worker_.emplace("model preview", [this, file](const std::stop_token&) {
+  if (worker_ && !worker_->finished()) return before;
+  worker_.emplace("model preview", [this, file, path, stamp](const std::stop_token&) {
     Read read;
+    read.stamp = stamp;
     try {
-      std::filesystem::path path = folder_ / file;
-      std::error_code error;
-      if (!std::filesystem::exists(path, error)) path = file;
       const content::AssetKind kind = KindOfFile(path);
       read.asset =
           std::make_shared<content::Asset>(kind == content::AssetKind::kImage   ? content::ImportImage(path)
@@ -40,7 +47,7 @@ std::shared_ptr<const content::Asset> ModelPreviews::Get(const std::string& file
     const std::scoped_lock lock(mutex_);
     read_[file] = std::move(read);
   });
-  return nullptr;
+  return before;
 }
 
 namespace {

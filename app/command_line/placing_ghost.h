@@ -9,6 +9,7 @@
 #include <string>
 
 #include "app/command_line/author_view.h"
+#include "app/files/file_stamp.h"
 #include "engine/base/worker.h"
 #include "ui/authoring_actions.h"
 
@@ -20,12 +21,14 @@ class ModelPreviews {
  public:
   // Relative files are searched in this folder first, then in the working folder, as commands do.
   explicit ModelPreviews(std::filesystem::path folder) : folder_(std::move(folder)) {}
-  // The asset of a file; null while it is read, and when it cannot be. One file is read at a time.
+  // The asset of a file, which is read again after it was written anew; null while it is read for the first
+  // time, and when it cannot be. One file is read at a time.
   std::shared_ptr<const content::Asset> Get(const std::string& file);
 
  private:
   struct Read {
     std::shared_ptr<const content::Asset> asset;  // Null when the file cannot be read.
+    FileStamp stamp;
   };
   const std::filesystem::path folder_;
   std::mutex mutex_;

@@ -7,11 +7,12 @@
 namespace docent::app {
 
 std::shared_ptr<const content::Asset> SessionAssets::Load(const std::string& file, content::AssetKind kind) {
-  auto& loaded = files_[{(folder_ / file).string(), kind}];
-  if (loaded) return loaded;
   std::filesystem::path path = folder_ / file;
   std::error_code error;
   if (!std::filesystem::exists(path, error)) path = file;
+  LoadedFile& loaded = files_[{(folder_ / file).string(), kind}];
+  const FileStamp stamp = StampOf(path);
+  if (loaded.asset && loaded.stamp == stamp) return loaded.asset;
   auto asset =
       std::make_shared<content::Asset>(kind == content::AssetKind::kImage   ? content::ImportImage(path)
                                        : kind == content::AssetKind::kSound ? content::ImportSound(path)
@@ -23,7 +24,8 @@ std::shared_ptr<const content::Asset> SessionAssets::Load(const std::string& fil
   // The same bytes may already be in use in a map: one copy is shared.
   auto& kept = assets_[asset->id];
   if (!kept) kept = std::move(asset);
-  return loaded = kept;
+  loaded = {kept, stamp};
+  return kept;
 }
 
 void SessionAssets::EvictUnused() {

@@ -8,6 +8,7 @@
 #include <utility>
 #include <vector>
 
+#include "app/files/file_stamp.h"
 #include "app/session/library_scene.h"
 #include "content/asset.h"
 
@@ -19,7 +20,8 @@ class SessionAssets {
  public:
   // Where relative files are searched first, before the working folder.
   void SetFolder(const std::filesystem::path& folder) { folder_ = folder; }
-  // The model, image or sound in this file, which is read once. Throws Error when it cannot be read as that.
+  // The model, image or sound in this file, which is read again only after it was written anew. Throws Error
+  // when it cannot be read as that.
   std::shared_ptr<const content::Asset> Load(const std::string& file,
                                              content::AssetKind kind = content::AssetKind::kModel);
 
@@ -34,9 +36,14 @@ class SessionAssets {
   void EvictUnused();
 
  private:
+  struct LoadedFile {
+    std::shared_ptr<const content::Asset> asset;  // null if the file could not be read
+    FileStamp stamp;
+  };
+
   AssetCache assets_;  // by id
   // by file name in commands, and what it is read as
-  std::map<std::pair<std::string, content::AssetKind>, std::shared_ptr<const content::Asset>> files_;
+  std::map<std::pair<std::string, content::AssetKind>, LoadedFile> files_;
   std::filesystem::path folder_;
   std::vector<std::string> warnings_;
 };
