@@ -75,10 +75,15 @@ void AuthorControls::Take(const std::vector<Notice>& notices) {
     if (!notice.done) continue;
     board_.AddDone(DoneText(*notice.done), CanBeUndone(*notice.done), Now());
     leaves_map_ = leaves_map_ || LeavesMap(*notice.done, map_name_);
-    const auto* const renamed_map = std::get_if<app::RenameMap>(&*notice.done);
-    if (renamed_map != nullptr && renamed_map->name == map_name_) map_name_ = renamed_map->new_name;
-    if (const auto* renamed = std::get_if<RenameEntity>(&*notice.done))
+    if (const auto* renamed_map = std::get_if<app::RenameMap>(&*notice.done)) {
+      for (std::string* name : {&map_name_, &copied_from_}) {
+        if (*name == renamed_map->name) *name = renamed_map->new_name;
+      }
+    }
+    if (const auto* renamed = std::get_if<RenameEntity>(&*notice.done)) {
       selection_.Rename(renamed->name, renamed->new_name);
+      if (copied_from_ == map_name_) std::ranges::replace(copied_names_, renamed->name, renamed->new_name);
+    }
   }
 }
 
@@ -110,7 +115,10 @@ void AuthorControls::KeepContent() {
     if (leaves_map_ || !view_.frame->shown.starting_map.empty()) content_.reset();
     return;
   }
-  map_name_ = view_.frame->shown.map_name;
+  // A frozen frame keeps the name that the map had before it was renamed (see Take).
+  std::pair seen(view_.frame->tracked.map_key, view_.frame->shown.map_name);
+  if (seen != seen_map_) map_name_ = seen.second;
+  seen_map_ = std::move(seen);
   if (!content_) leaves_map_ = false;
   if (!view_.scene) return;
   content_ = view_.scene;
@@ -470,9 +478,9 @@ void AuthorControls::DuplicateSelected() {
 }
 
 void AuthorControls::CopySelected() {
-  if (selection_.empty() || !view_.frame) return;
+  if (selection_.empty() || map_name_.empty()) return;
   copied_names_ = selection_.names();
-  copied_from_ = view_.frame->shown.map_name;
+  copied_from_ = map_name_;
 }
 
 // At the pointer, if it is over the image.

@@ -126,15 +126,16 @@ class AuthorControls final : public CommandActions {
   std::shared_ptr<const content::Scene> preview_;
   std::vector<std::string> faint_;
   bool preview_changed_ = false;
-  std::string ghost_note_;  // Why nothing can be placed under the pointer.
-  // What was copied, and the map that it is in.
+  std::string ghost_note_;                                   // Why nothing can be placed under the pointer.
   Eigen::Vector2d measured_from_ = Eigen::Vector2d::Zero();  // Pixel of the first end; see ui::MapPick.
+  // What was copied, and the map that it is in.
   std::vector<std::string> copied_names_;
   std::string copied_from_;
   // Names before a command that adds entities, which are selected when they appear.
   std::optional<std::vector<std::string>> names_before_;
-  std::uint64_t scene_map_ = 0;  // The map whose entities are selected.
-  std::string map_name_;         // Its name.
+  std::uint64_t scene_map_ = 0;                     // The map whose entities are selected.
+  std::string map_name_;                            // Its name.
+  std::pair<std::uint64_t, std::string> seen_map_;  // Key and name in the last frame with a map.
   // What the panel shows of that map, as it was seen last, so that what is being written there is not lost
   // with the camera. The content is null before it was seen, and while a lost camera is meant to leave the
   // map.

@@ -151,6 +151,38 @@ TEST_F(AuthorAtControls, NothingIsWrittenToAMapThatWasRenamedAndRemovedWhileTheC
   EXPECT_THAT(commands_, IsEmpty());
 }
 
+TEST_F(AuthorAtControls, NothingIsWrittenToAMapThatWasRenamedAndRemovedWhileTheViewWasFrozen) {
+  WriteName();
+  controls_->Take({Notice{"", RenameMap{"Hall", "Lobby"}}});
+  Draw(3);  // The frozen frame has the name that the map had.
+  controls_->Take({Notice{"", RemoveMap{"Lobby"}}});
+  is_in_map_ = false;
+  Draw(3);
+  PressReturn();
+  EXPECT_THAT(commands_, IsEmpty());
+}
+
+TEST_F(AuthorAtControls, WhatIsCopiedWhileTheCameraIsLostIsPasted) {
+  controls_->Select("sign-1", false);
+  Draw(1);
+  is_in_map_ = false;
+  Draw(1);
+  controls_->CopySelected();
+  is_in_map_ = true;
+  Draw(1);
+  controls_->Paste();
+  EXPECT_THAT(commands_, ElementsAre(Command(PasteEntities{{"sign-1"}, "Hall", std::nullopt})));
+}
+
+TEST_F(AuthorAtControls, WhatWasCopiedIsPastedUnderItsNewNames) {
+  controls_->Select("sign-1", false);
+  Draw(1);
+  controls_->CopySelected();
+  controls_->Take({Notice{"", RenameEntity{"sign-1", "Cove"}}, Notice{"", RenameMap{"Hall", "Lobby"}}});
+  controls_->Paste();
+  EXPECT_THAT(commands_, ElementsAre(Command(PasteEntities{{"Cove"}, "Lobby", std::nullopt})));
+}
+
 TEST_F(AuthorAtControls, WhatIsBeingWrittenIsACommandBeforeThePanelCloses) {
   WriteName();
   // Both keys come in one frame, as from a slow machine.
