@@ -3,7 +3,9 @@
 
 #include <CLI/CLI.hpp>
 #include <cstdlib>
+#include <filesystem>
 #include <map>
+#include <system_error>
 
 #include "app/files/text_file.h"
 #include "content/language.h"
@@ -241,6 +243,17 @@ std::string LanguageOfEnvironment() {
   return "";
 }
 
+namespace {
+
+// Whether the file exists and has the images of a recording.
+bool IsVideoOf(const std::filesystem::path& file, const std::filesystem::path& recording) {
+  std::error_code error;
+  return std::filesystem::equivalent(file, recording, error) ||
+         std::filesystem::equivalent(file, recording / "video.mp4", error);
+}
+
+}  // namespace
+
 void CheckRunArguments(const RunArguments& run) {
   if (run.cameras.sources.size() > 2)
     throw CLI::ValidationError("--camera", "at most two cameras are supported");
@@ -252,6 +265,10 @@ void CheckRunArguments(const RunArguments& run) {
   }
   if (run.cameras.until > Timestamp{} && run.cameras.until <= run.cameras.from) {
     throw CLI::ValidationError("--until", "must be later than --from");
+  }
+  for (const std::string& source : run.cameras.sources) {
+    if (run.record && IsVideoOf(*run.record, source))
+      throw CLI::ValidationError("--record", "would overwrite the images of --camera " + source);
   }
 }
 

@@ -13,6 +13,7 @@
 #include "app/command_line/program.h"
 #include "app/command_line/text_table.h"
 #include "app/evaluation/ground_truth.h"
+#include "app/files/text_file.h"
 #include "app/session/library_scene.h"
 #include "maps/library/library.h"
 #include "tests/app/support/board_camera.h"
@@ -250,6 +251,20 @@ TEST(CommandLine, CalibratesACameraFromAFolderOfImages) {
   EXPECT_EQ(ReadAll(output), before);
   ExpectErrorLine({"calibrate"}, 2, "--print");
   ExpectErrorLine({"calibrate", "--print", "x.pdf", "--board", "charuco:8"}, 2, "calibration board");
+}
+
+TEST(CommandLine, DoesNotRecordOverItsOwnImages) {
+  const TemporaryFolder folder;
+  const std::string walk = folder.Write("walk.mp4", std::string("images")).string();
+  const std::string video = folder.Write("sequence/video.mp4", std::string("images")).string();
+  const std::string library = (folder / "museum.docent").string();
+  for (const std::string& record : {walk, (folder / "sequence/../walk.mp4").string(), video}) {
+    ExpectErrorLine({"author", "--library", library, "--camera", walk, "--camera",
+                     (folder / "sequence").string(), "--record", record, "--headless"},
+                    2, "would overwrite the images");
+  }
+  EXPECT_EQ(ReadTextFile(walk), "images");
+  EXPECT_EQ(ReadTextFile(video), "images");
 }
 
 TEST(CommandLine, HandlesAnEmptyLibrary) {
