@@ -7,6 +7,7 @@
 #include <CLI/CLI.hpp>
 #include <cstdio>
 #include <exception>
+#include <filesystem>
 #include <memory>
 #include <new>
 #include <opencv2/core.hpp>
@@ -73,6 +74,9 @@ int RunGuarded(const std::function<void()>& run) {
     return ReportError("There is not enough memory.", kFailed);
   } catch (const cv::Exception& error) {
     return ReportError("An image operation failed: " + error.err + " (" + error.func + ").", kFailed);
+  } catch (const std::filesystem::filesystem_error& error) {
+    return ReportError("'" + error.path1().string() + "' cannot be used: " + error.code().message() + ".",
+                       kFailed);
   } catch (const std::exception& error) {
     return ReportError(std::string("Internal error: ") + error.what() + ".", kFailed);
   }

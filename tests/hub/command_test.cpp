@@ -106,6 +106,8 @@ TEST_F(HubCommand, ErrorsAreOneSentence) {
   ExpectErrorLine({"maps", "pull", "Nothing", "--library", Path("c.docent"), "--hub", Url()}, 1,
                   "no map named 'Nothing'");
   ExpectErrorLine({"maps", "push", "--library", Path("missing.docent"), "--hub", Url()}, 1, "does not exist");
+  std::ofstream(Path("file")) << "no folder";
+  ExpectErrorLine({"hub", "collect", Path("file") + "/visits", "--hub", Url()}, 1, "' cannot be used: ");
 }
 
 TEST_F(HubCommand, AnAuthorsMapIsOnTheHubWhenTheSessionEnds) {
