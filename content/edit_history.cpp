@@ -2,6 +2,7 @@
 #include "content/edit_history.h"
 
 #include <algorithm>
+#include <iterator>
 #include <map>
 #include <utility>
 
@@ -36,26 +37,41 @@ void ApplyToList(const EntityChange& change, Scene* scene) {
   }
 }
 
-// Follows an entity through one change, from its state after the change to that before it (or the other way
-// round for a reversed one), and moves what is stored of it. `name` is its name before the change afterwards.
-// Returns false where the entity begins.
-bool MoveStored(const engine::Sim3& motion, bool backwards, SceneChange* change, std::string* name) {
-  const auto step = [&](EntityChange* entity) {
-    std::optional<Entity>& known = backwards ? entity->after : entity->before;
-    std::optional<Entity>& other = backwards ? entity->before : entity->after;
-    if (!known || known->name != *name) return true;
-    MoveWithAnchor(motion, &*known);
-    if (!other) return false;
-    MoveWithAnchor(motion, &*other);
-    *name = other->name;
-    return true;
-  };
-  auto& entities = change->entities;
-  if (backwards) {
-    return std::all_of(entities.rbegin(), entities.rend(), [&](EntityChange& e) { return step(&e); });
+// Moves what is stored of an entity, and follows it through changes from its state after one to that before
+// it (or the other way round if not `backwards`), until it begins.
+class StoredStates {
+ public:
+  // name: of the entity where the first change is entered.
+  StoredStates(const engine::Sim3& motion, bool backwards, std::string name)
+      : motion_(motion), backwards_(backwards), name_(std::move(name)) {}
+
+  // The last changes come first. Both return false once the entity begins.
+  bool Move(SceneChange* change) { return Move(change, backwards_ ? change->entities.size() : 0); }
+  // Only those before the one with this index, or from it on.
+  bool Move(SceneChange* change, std::size_t index) {
+    const auto step = [this](EntityChange& entity) { return Move(&entity); };
+    auto& entities = change->entities;
+    const auto place = entities.begin() + static_cast<Difference>(index);
+    return backwards_ ? std::all_of(std::make_reverse_iterator(place), entities.rend(), step)
+                      : std::all_of(place, entities.end(), step);
   }
-  return std::all_of(entities.begin(), entities.end(), [&](EntityChange& e) { return step(&e); });
-}
+
+ private:
+  bool Move(EntityChange* entity) {
+    std::optional<Entity>& known = backwards_ ? entity->after : entity->before;
+    std::optional<Entity>& other = backwards_ ? entity->before : entity->after;
+    if (!known || known->name != name_) return true;
+    MoveWithAnchor(motion_, &*known);
+    if (!other) return false;
+    MoveWithAnchor(motion_, &*other);
+    name_ = other->name;
+    return true;
+  }
+
+  const engine::Sim3 motion_;
+  const bool backwards_;
+  std::string name_;
+};
 
 }  // namespace
 
@@ -97,14 +113,36 @@ bool EditHistory::Redo(Scene* scene) {
 }
 
 void EditHistory::MoveWithAnchor(const std::string& name, const engine::Sim3& motion) {
-  std::string earlier = name;
-  for (auto change = done_.rbegin(); change != done_.rend(); ++change) {
-    if (!MoveStored(motion, true, &*change, &earlier)) break;
+  StoredStates earlier(motion, true, name), later(motion, false, name);
+  for (auto change = done_.rbegin(); change != done_.rend() && earlier.Move(&*change);) ++change;
+  for (auto change = undone_.rbegin(); change != undone_.rend() && later.Move(&*change);) ++change;
+}
+
+std::vector<AbsentEntity> EditHistory::Absent(std::size_t most) const {
+  std::vector<AbsentEntity> absent;
+  for (const bool undone : {false, true}) {
+    const std::vector<SceneChange>& changes = undone ? undone_ : done_;
+    const std::size_t end = absent.size() + most;
+    for (std::size_t i = changes.size(); i-- > 0 && absent.size() < end;) {
+      const auto& entities = changes[i].entities;
+      for (std::size_t k = 0; k < entities.size(); ++k) {
+        const std::optional<Entity>& here = undone ? entities[k].before : entities[k].after;
+        if (!here) absent.push_back({undone ? *entities[k].after : *entities[k].before, undone, i, k});
+      }
+    }
+    if (absent.size() > end) absent.resize(end);
   }
-  std::string later = name;
-  for (auto change = undone_.rbegin(); change != undone_.rend(); ++change) {
-    if (!MoveStored(motion, false, &*change, &later)) break;
-  }
+  return absent;
+}
+
+void EditHistory::MoveWithAnchor(const AbsentEntity& absent, const engine::Sim3& motion) {
+  std::vector<SceneChange>& changes = absent.undone ? undone_ : done_;
+  EntityChange& end = changes[absent.change].entities[absent.index];
+  Entity& state = absent.undone ? *end.after : *end.before;
+  content::MoveWithAnchor(motion, &state);
+  StoredStates others(motion, !absent.undone, state.name);
+  bool goes_on = others.Move(&changes[absent.change], absent.index + (absent.undone ? 1 : 0));
+  for (std::size_t i = absent.change; goes_on && i-- > 0;) goes_on = others.Move(&changes[i]);
 }
 
 bool EditHistory::RetargetSignposts(const std::function<bool(Signpost*)>& retarget) {

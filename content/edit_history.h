@@ -40,6 +40,14 @@ SceneChange Reversed(const SceneChange& change);
 // is no 'helmet' in this map."), or the result could not be stored (Validate in scene.h).
 void ApplyChange(const SceneChange& change, Scene* scene);
 
+// An entity that is not in the scene now: one that was removed, which undo restores, or one whose addition
+// was undone, which redo restores. Valid until the history changes.
+struct AbsentEntity {
+  Entity entity;                      // As it is restored.
+  bool undone = false;                // By redo.
+  std::size_t change = 0, index = 0;  // Where in the history.
+};
+
 // The applied and undone changes of a scene, in order.
 class EditHistory {
  public:
@@ -59,6 +67,10 @@ class EditHistory {
   // Transforms what is stored of an entity after its anchor has moved in the map. The entity has this name in
   // the scene now; changes of an earlier entity of that name stay as they are.
   void MoveWithAnchor(const std::string& name, const engine::Sim3& motion);
+  // The entities that only undo or only redo would restore: at most so many of each, the first ones first.
+  std::vector<AbsentEntity> Absent(std::size_t most) const;
+  // Transforms what is stored of an entity that is not in the scene.
+  void MoveWithAnchor(const AbsentEntity& absent, const engine::Sim3& motion);
   // Lets all stored states of signposts lead elsewhere after something has happened to maps, so that undo and
   // redo restore no target that is gone. `retarget` changes a signpost where it has to, and returns whether
   // it did. Returns whether it changed any.

@@ -178,19 +178,18 @@ maps::MoveScene SceneMover(const std::string& library) {
                    const engine::MapSnapshot& after) {
     AssetCache assets;
     maps::StoredContent moved;
-    const content::Scene scene = SceneFromRecord(*stored.scene, library, &assets);
-    const auto motions = ContentFollower().Follow(scene, before, after);
-    if (motions.empty()) return moved;
-    const auto moved_scene = Moved(scene, motions);
-    moved.scene = std::make_shared<maps::SceneRecord>(RecordFromScene(*moved_scene));
-    if (!stored.history) return moved;
+    auto scene = std::make_shared<const content::Scene>(SceneFromRecord(*stored.scene, library, &assets));
+    std::optional<content::EditHistory> history;
     try {
-      content::EditHistory history = HistoryFromRecord(*stored.history, library, &assets);
-      for (const auto& [entity, motion] : motions) history.MoveWithAnchor(entity, motion);
-      moved.history = std::make_shared<maps::SceneRecord>(RecordFromHistory(history, *moved_scene));
+      if (stored.history) history = HistoryFromRecord(*stored.history, library, &assets);
     } catch (const Error&) {
-      moved.history.reset();  // A damaged history costs nothing else.
+      history.reset();  // A damaged history costs nothing else.
     }
+    content::EditHistory changes = history.value_or(content::EditHistory());
+    ContentFollower follower;
+    if (!MoveContent(before, after, &follower, &scene, &changes)) return moved;
+    moved.scene = std::make_shared<maps::SceneRecord>(RecordFromScene(*scene));
+    if (history) moved.history = std::make_shared<maps::SceneRecord>(RecordFromHistory(changes, *scene));
     return moved;
   };
 }
@@ -215,8 +214,8 @@ class InterruptFlag {
 };
 
 void Optimize(const ExchangeOptions& options, Verbosity verbosity) {
-  const maps::SessionLock lock(options.library, maps::SessionLockKind::kReplace);
   maps::Library library = OpenLibrary(options.library, maps::Access::kReadWrite);
+  const maps::SessionLock lock(options.library, maps::SessionLockKind::kReplace);
   std::vector<maps::MapInfo> infos = library.List();
   if (!options.name.empty()) infos = {library.FindByName(options.name)};
   const InterruptFlag interrupt;
@@ -267,8 +266,8 @@ void Densify(const ExchangeOptions& options, Verbosity verbosity) {
 }
 
 void Join(const ExchangeOptions& options, Verbosity verbosity) {
-  const maps::SessionLock lock(options.library, maps::SessionLockKind::kReplace);
   maps::Library library = OpenLibrary(options.library, maps::Access::kReadWrite);
+  const maps::SessionLock lock(options.library, maps::SessionLockKind::kReplace);
   const std::uint64_t into = library.FindByName(options.name).key,
                       from = library.FindByName(options.other_name).key;
   const InterruptFlag interrupt;

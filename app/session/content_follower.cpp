@@ -60,4 +60,31 @@ std::shared_ptr<const content::Scene> Moved(const content::Scene& scene,
   return moved;
 }
 
+bool MoveContent(const engine::MapSnapshot& before, const engine::MapSnapshot& now, ContentFollower* follower,
+                 std::shared_ptr<const content::Scene>* scene, content::EditHistory* history) {
+  // More than anybody undoes one after the other; each costs a fraction of a millisecond.
+  constexpr std::size_t kMostAbsent = 100;
+  const std::vector<content::AbsentEntity> absent = history->Absent(kMostAbsent);
+  if ((*scene)->entities.empty() && absent.empty()) return false;
+  content::Scene all = **scene;
+  // No entity has such a name, and each gets another one, because some were removed under the same name.
+  std::map<std::string, const content::AbsentEntity*> by_name;
+  for (const content::AbsentEntity& one : absent) {
+    content::Entity& entity = all.entities.emplace_back(one.entity);
+    entity.name = '\n' + std::to_string(by_name.size());
+    by_name[entity.name] = &one;
+  }
+  const ContentFollower::Motions motions = follower->Follow(all, before, now);
+  if (motions.empty()) return false;
+  *scene = Moved(**scene, motions);
+  for (const auto& [name, motion] : motions) {
+    if (const auto found = by_name.find(name); found != by_name.end()) {
+      history->MoveWithAnchor(*found->second, motion);
+    } else {
+      history->MoveWithAnchor(name, motion);
+    }
+  }
+  return true;
+}
+
 }  // namespace docent::app

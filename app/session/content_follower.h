@@ -7,6 +7,7 @@
 #include <utility>
 #include <vector>
 
+#include "content/edit_history.h"
 #include "content/scene.h"
 #include "engine/map/local_points.h"
 
@@ -37,5 +38,10 @@ class ContentFollower {
 // The scene with these motions applied.
 std::shared_ptr<const content::Scene> Moved(const content::Scene& scene,
                                             const ContentFollower::Motions& motions);
+
+// Moves the content of a map from its place in `before` to that in `now`, and with it what undo and redo
+// restore. Returns false if nothing moved; else the scene is a new one, also if only the history changed.
+bool MoveContent(const engine::MapSnapshot& before, const engine::MapSnapshot& now, ContentFollower* follower,
+                 std::shared_ptr<const content::Scene>* scene, content::EditHistory* history);
 
 }  // namespace docent::app

@@ -104,10 +104,9 @@ bool IdleMaintenance::Adjust(const IdleMap& chosen, const std::atomic<bool>& int
   record.expected_revision = chosen.snapshot->revision;
   // Content that another program has saved meanwhile would be lost, or would stay where its anchors were.
   record.expected_scene = stored_scene;
-  const auto motions = ContentFollower().Follow(*scene, *chosen.snapshot, *adjusted.snapshot);
-  if (!motions.empty()) {
-    const auto moved = Moved(*scene, motions);
-    for (const auto& [entity, motion] : motions) history.MoveWithAnchor(entity, motion);
+  ContentFollower follower;
+  std::shared_ptr<const content::Scene> moved = scene;
+  if (MoveContent(*chosen.snapshot, *adjusted.snapshot, &follower, &moved, &history)) {
     record.scene = std::make_shared<maps::SceneRecord>(RecordFromScene(*moved));
     record.history = std::make_shared<maps::SceneRecord>(RecordFromHistory(history, *moved));
   }

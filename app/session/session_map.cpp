@@ -20,11 +20,7 @@ void SessionMap::Discard() {
 void SessionMap::UpdateSnapshot(std::shared_ptr<const engine::MapSnapshot> newer) {
   const auto before = std::exchange(snapshot, std::move(newer));
   SetMesh(std::move(mesh), std::move(light));
-  if (!before || !snapshot || scene->entities.empty()) return;
-  const ContentFollower::Motions motions = follower.Follow(*scene, *before, *snapshot);
-  if (motions.empty()) return;
-  scene = Moved(*scene, motions);
-  for (const auto& [entity, motion] : motions) history.MoveWithAnchor(entity, motion);
+  if (before && snapshot) MoveContent(*before, *snapshot, &follower, &scene, &history);
 }
 
 void SessionMap::SetMesh(std::shared_ptr<const engine::MapMesh> made,

@@ -119,6 +119,31 @@ TEST(Edits, UndoAndRedoFollowAMovedAnchor) {
   }
 }
 
+TEST(EditHistory, AbsentEntitiesOfOneNameAreMovedApart) {
+  Scene scene;
+  EditHistory history;
+  Entity second = ModelEntity("fox");
+  second.model.map_from_model.translation = {10, 0, 0};
+  history.Do(AddEdit(scene, ModelEntity("fox")), &scene);
+  history.Do(RemoveEdit(scene, {"fox"}), &scene);
+  history.Do(AddEdit(scene, second), &scene);
+  history.Do(RemoveEdit(scene, {"fox"}), &scene);
+  const std::vector<AbsentEntity> absent = history.Absent(5);
+  ASSERT_EQ(absent.size(), 2u);
+  EXPECT_EQ(history.Absent(1).size(), 1u);
+  EXPECT_EQ(PlaceOf(absent[0].entity).x(), 10) << "undo restores it first";
+  history.MoveWithAnchor(absent[0], {{}, {0, 0, 5}, 1});
+  ASSERT_TRUE(history.Undo(&scene));
+  EXPECT_EQ(PlaceOf(scene.entities[0]), Eigen::Vector3d(10, 0, 5));
+  ASSERT_TRUE(history.Undo(&scene));
+  ASSERT_TRUE(history.Undo(&scene));
+  EXPECT_EQ(PlaceOf(scene.entities[0]), PlaceOf(ModelEntity("fox")));
+  // Both are absent again: the second one may be added by redo.
+  ASSERT_TRUE(history.Undo(&scene));
+  EXPECT_EQ(history.Absent(5).size(), 2u);
+  EXPECT_TRUE(history.Absent(5)[1].undone);
+}
+
 TEST(EditHistory, OnlyTheEntityThatHasTheNameNowFollowsItsAnchor) {
   Scene scene;
   EditHistory history;

@@ -117,6 +117,49 @@ TEST(ContentFollower, FollowsContentFromItsNewPlaceAfterAnEdit) {
       << "undo returns it to its first place, moved by both adjustments";
 }
 
+// Of both things, one after the other, and then both at once, so that the scene is empty.
+TEST(ContentFollower, WhatWasRemovedIsRestoredAtItsNewPlace) {
+  for (const auto& removed :
+       {std::vector<std::string>{"fox"}, std::vector<std::string>{"sign-1"}, {"fox", "sign-1"}}) {
+    SessionMap map = MapWithContent();
+    auto scene = std::make_shared<content::Scene>(*map.scene);
+    map.history.Do(content::MoveEdit(*scene, removed.front(), {-0.5, 0.4, 2.6}), scene.get());
+    map.history.Do(content::RemoveEdit(*scene, removed), scene.get());
+    map.scene = scene;
+    const auto before = map.scene;
+    map.UpdateSnapshot(Moved(*map.snapshot, Bend()));
+    EXPECT_NE(map.scene, before) << "the history is saved with the scene";
+    scene = std::make_shared<content::Scene>(*map.scene);
+    ASSERT_TRUE(map.history.Undo(scene.get()));
+    const auto place = [&](const std::string& name) { return content::PlaceOf(*scene->Find(name)); };
+    EXPECT_LT((place(removed.front()) - Bend() * Eigen::Vector3d(-0.5, 0.4, 2.6)).norm(), 1e-9);
+    ASSERT_TRUE(map.history.Undo(scene.get()));
+    const content::Scene placed = TwoThings();
+    for (const char* name : {"fox", "sign-1"})
+      EXPECT_LT((place(name) - Bend() * content::PlaceOf(*placed.Find(name))).norm(), 1e-9) << name;
+  }
+}
+
+TEST(ContentFollower, WhatWasAddedAndUndoneIsAddedAgainAtItsNewPlace) {
+  SessionMap map;
+  map.snapshot = Cloud();
+  auto scene = std::make_shared<content::Scene>();
+  map.history.Do(content::AddEdit(*scene, TwoThings().entities[0]), scene.get());
+  map.history.Do(content::MoveEdit(*scene, "fox", {-0.5, 0.4, 2.6}), scene.get());
+  ASSERT_TRUE(map.history.Undo(scene.get()));
+  ASSERT_TRUE(map.history.Undo(scene.get()));
+  map.scene = scene;
+  for (int i = 0; i < 2; ++i) map.UpdateSnapshot(Moved(*map.snapshot, Bend()));
+  scene = std::make_shared<content::Scene>(*map.scene);
+  const auto distance = [&](const Eigen::Vector3d& placed) {
+    return (content::PlaceOf(*scene->Find("fox")) - Bend() * (Bend() * placed)).norm();
+  };
+  ASSERT_TRUE(map.history.Redo(scene.get()));
+  EXPECT_LT(distance({0.2, 0.1, 2.8}), 1e-9);
+  ASSERT_TRUE(map.history.Redo(scene.get()));
+  EXPECT_LT(distance({-0.5, 0.4, 2.6}), 1e-9);
+}
+
 // Loop closing moves one part of the map by several percent while another stays, and removes a large part of
 // the points as duplicates.
 TEST(ContentFollower, FollowsTheMapWhenALoopIsClosed) {
