@@ -115,7 +115,8 @@ void WideBaselineViews::Remember(Remembered image) {
   if (calls_ % remembered_every_ != 0) return;
   images_.push_back(std::move(image));
   if (images_.size() < kMaxRemembered) return;
-  for (std::size_t i = 0; 2 * i < images_.size(); ++i) images_[i] = std::move(images_[2 * i]);
+  // The first one stays where it is: moved to itself, it would lose its corners.
+  for (std::size_t i = 1; 2 * i < images_.size(); ++i) images_[i] = std::move(images_[2 * i]);
   images_.resize((images_.size() + 1) / 2);
   remembered_every_ *= 2;
 }

@@ -77,6 +77,15 @@ TEST(WideBaselineViews, TriesThoseThatHaveWaitedLongestUnlessToldOtherwise) {
   EXPECT_NE(times(Show(CameraAt({0.3, 0, 0}), 140, &views)).front(), time(4)) << "it was tried last";
 }
 
+TEST(WideBaselineViews, KeepsTheFirstImageWhenOthersAreForgotten) {
+  WideBaselineViews views;
+  Show(CameraAt({0, 0, 0}), 0, &views);
+  for (int call = 1; call < 60; ++call) Show(CameraAt({0, 0, 0}, {0, 90, 0}), 4 * call, &views);
+  const auto pairs = Show(CameraAt({0.25, 0, 0}), 240, &views);
+  ASSERT_EQ(pairs.size(), 1u);
+  EXPECT_EQ(pairs.front().earlier.image.time, ImageAt(CameraAt({0, 0, 0}), 0).time);
+}
+
 TEST(WideBaselineViews, RemembersImagesOfTheWholeTimeButNoMoreThanFortyEight) {
   WideBaselineViews views;
   std::set<Timestamp> used;
