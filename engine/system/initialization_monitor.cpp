@@ -22,6 +22,12 @@ std::optional<std::string> InitializationMonitorOptions::Validate() const {
       .fault();
 }
 
+namespace {
+
+constexpr std::size_t kFewestSamples = 3;
+
+}  // namespace
+
 void InitializationMonitor::Add(const TrackedFrame& frame) {
   if (!HasPose(frame.state) || !frame.map || !frame.map->HasFinitePoints()) return;
   const Timestamp now = frame.frame.time;
@@ -40,7 +46,11 @@ void InitializationMonitor::Add(const TrackedFrame& frame) {
     return;
   }
   recent_.push_back({now, inlier_ratio});
-  std::erase_if(recent_, [&](const Sample& sample) { return now - sample.time > options_.recent_period; });
+  const auto has_expired = [&](const Sample& sample) {
+    const bool is_needed = recent_.size() <= kFewestSamples;
+    return now - sample.time > (is_needed ? options_.longest_recent_period : options_.recent_period);
+  };
+  while (has_expired(recent_.front())) recent_.erase(recent_.begin());
   const Rigid3 moved = frame.camera_from_map * first_pose_->inverse();
   is_near_ = moved.translation.norm() <= options_.max_distance * depth_ &&
              moved.rotation.Angle() <= options_.max_rotation;
@@ -77,7 +87,7 @@ std::optional<InitializationMonitor::Fault> InitializationMonitor::FindJump() co
 }
 
 std::optional<InitializationMonitor::Fault> InitializationMonitor::FindFault() const {
-  if (initial_count_ == 0 || recent_.size() < 3 || !is_near_) return std::nullopt;
+  if (initial_count_ == 0 || recent_.size() < kFewestSamples || !is_near_) return std::nullopt;
   const double initial = initial_sum_ / initial_count_;
   const double recent =
       std::accumulate(recent_.begin(), recent_.end(), 0.0,

@@ -19,6 +19,8 @@ struct InitializationMonitorOptions {
   // Periods over which the initial and the recent inlier ratio are averaged.
   Timestamp initial_period = std::chrono::milliseconds(200);
   Timestamp recent_period = std::chrono::milliseconds(200);
+  // At least three samples are averaged. Where there are fewer images, the period is longer, up to this one.
+  Timestamp longest_recent_period = std::chrono::milliseconds(600);
   // Beyond this distance from its first view (ratio of the median depth) or this rotation, the points of a
   // correct map may be out of view.
   double max_distance = 0.3;

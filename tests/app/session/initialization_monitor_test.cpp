@@ -17,15 +17,17 @@ std::shared_ptr<const engine::MapSnapshot> MapWithDepth() {
   return map;
 }
 
-// 1.5 seconds at 30 Hz. The inlier ratio falls from 0.9 to `last`, and the camera moves by this distance (map
-// units) and rotation (radians).
-std::optional<engine::InitializationMonitor::Fault> FaultAfter(double last, double distance, double turn) {
+// 1.5 seconds. The inlier ratio falls from 0.9 to `last`, and the camera moves by this distance (map units)
+// and rotation (radians).
+std::optional<engine::InitializationMonitor::Fault> FaultAfter(double last, double distance, double turn,
+                                                               double rate_hz = 30) {
   engine::InitializationMonitor monitor;
   const auto map = MapWithDepth();
-  for (int i = 0; i <= 45; ++i) {
-    const double part = i / 45.0;
+  const int images = static_cast<int>(1.5 * rate_hz);
+  for (int i = 0; i <= images; ++i) {
+    const double part = i / static_cast<double>(images);
     engine::TrackedFrame frame;
-    frame.frame.time = FromSeconds(i / 30.0);
+    frame.frame.time = FromSeconds(i / rate_hz);
     frame.state = engine::TrackingState::kSixDof;
     frame.map = map;
     frame.finite_points = 100;
@@ -42,6 +44,13 @@ TEST(InitializationMonitor, ReportsAMapWhosePointsAreLostWhileTheCameraHardlyMov
   ASSERT_TRUE(fault);
   EXPECT_GT(fault->initial_inlier_ratio, 0.8);
   EXPECT_LT(fault->recent_inlier_ratio, 0.4 * fault->initial_inlier_ratio);
+}
+
+TEST(InitializationMonitor, ReportsItFromFewImagesASecondToo) {
+  for (const double rate_hz : {15.0, 10.0, 8.0, 6.0}) {
+    EXPECT_TRUE(FaultAfter(0.1, 0.05, 0.05, rate_hz)) << rate_hz;
+    EXPECT_FALSE(FaultAfter(0.7, 0.05, 0.05, rate_hz)) << rate_hz;
+  }
 }
 
 TEST(InitializationMonitor, AcceptsAMapWhosePointsAreStillFound) {
