@@ -38,7 +38,7 @@ class MapAssignment {
   // has_snapshot: its panorama map stays.
   void FailStart(bool has_snapshot, bool after_loss);
 
-  // The results of its frames.
+  // The results of its frames: the camera, or another one in its map, is tracked, or all are lost.
   void SetTracked() { lost_since_.reset(); }
   void SetLost(Timestamp time);
 
@@ -51,7 +51,8 @@ class MapAssignment {
   bool is_starting() const { return starting_; }
   // Of the maps that were started, it started the last one.
   bool started_map() const { return started_map_; }
-  std::optional<Timestamp> lost_since() const { return lost_since_; }  // while it is lost in the map
+  // Since when it is lost in the map together with all other cameras.
+  std::optional<Timestamp> lost_since() const { return lost_since_; }
   bool IsLostFor(Timestamp duration, Timestamp now) const {
     return lost_since_ && now - *lost_since_ > duration;
   }

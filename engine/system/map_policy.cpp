@@ -29,6 +29,9 @@ void MapPolicy::HandleResult(std::size_t index, TrackedFrame* frame) {
   if (has_pose) {
     camera->assignment.SetTracked();
     calibrations_.AddFrame(index, *frame);
+  } else if (state_.association.AnyTracked()) {
+    // A camera that looks elsewhere says nothing of the map. Its loss counts from when all are lost.
+    camera->assignment.SetTracked();
   } else if (frame->state == TrackingState::kLost) {
     camera->assignment.SetLost(now);
   }

@@ -100,6 +100,34 @@ TEST_F(PolicyForTwoCameras, LetsTheLostCameraStartAReplacementOfTheMapOfADisconn
   EXPECT_EQ(NextOrder(1), Order::kStart);
 }
 
+TEST_F(PolicyForTwoCameras, CountsNoLossWhileTheOtherCameraIsTracked) {
+  policy_.StartMap(1, 0, false);
+  for (const std::size_t camera : {0, 1}) NextOrder(camera);
+  MapOf(1).SetSnapshot(MapWithoutDepth());
+  Handle(0, 1.0, TrackingState::kPanorama, 1);
+  for (const double seconds : {1.0, 2.0}) Lose(1, seconds);  // It looks elsewhere.
+  Handle(0, 2.0, TrackingState::kPanorama, 1);
+  Lose(0, 2.03);
+  Lose(1, 2.04);
+  EXPECT_TRUE(MapOf(1).Exists()) << "both are lost for 10 ms only";
+  EXPECT_EQ(Assignment(0).map(), 1u);
+  Lose(1, 2.3);
+  EXPECT_FALSE(MapOf(1).Exists());
+}
+
+TEST_F(PolicyForTwoCameras, StartsNoMapForACameraThatLooksElsewhereWhenTheOtherMissesAnImage) {
+  options_.new_map_when_lost = true;
+  LoseMapWithAPoint(0.5);
+  Handle(0, 0.6, TrackingState::kSixDof, 1);
+  for (const double seconds : {1.0, 5.0, 9.0}) {
+    Handle(0, seconds, TrackingState::kSixDof, 1);
+    Lose(1, seconds);
+  }
+  Lose(0, 9.03);
+  Lose(1, 9.04);
+  EXPECT_EQ(state_.active_key, 1u);
+}
+
 TEST_F(PolicyForTwoCameras, KeepsAMapWithoutDepthThatNoCameraStarted) {
   EnterMapWithoutDepth(1);
   for (const double seconds : {2.0, 2.2, 9.0}) Lose(0, seconds);
