@@ -112,8 +112,12 @@ void CameraFeed::CarryOutGiven() {
   if (last_tracked_) command_runner_.RunGiven(last_tracked_->frame.time - *first_time_, *last_tracked_);
 }
 
-void CameraFeed::ContinueDisconnected() {
+void CameraFeed::Disconnect() {
   session_->Disconnect(static_cast<std::size_t>(run_.options.camera));
+}
+
+void CameraFeed::ContinueDisconnected() {
+  Disconnect();
   CarryOutGiven();
   if (last_tracked_) session_->Idle(std::max(frame_.time, last_tracked_->frame.time));
   if (run_.options.disconnected) run_.options.disconnected(last_tracked_ ? &*last_tracked_ : nullptr);

@@ -64,6 +64,8 @@ class CameraFeed {
   void CarryOutGiven();
   // The time between two calls of CarryOut.
   static void Rest(const std::stop_token& stop);
+  // There are no more images of this camera, while others go on.
+  void Disconnect();
   // Throws Error if the images ended before the last command of the script.
   void CheckAllDone() const { command_runner_.CheckAllDone(); }
 

@@ -65,6 +65,7 @@ void RunInterleaved(std::vector<CameraFeed>* feeds, const std::stop_token& stop)
     (*oldest)->Pause(stop);
     if ((*oldest)->Fetch(stop)) continue;
     if (*oldest == &feeds->front()) return;
+    (*oldest)->Disconnect();
     running.erase(oldest);
   }
 }
@@ -83,6 +84,8 @@ void RunConcurrently(std::vector<CameraFeed>* feeds, Pace pace, std::stop_source
         feed.Handle(stop);
         feed.Pause(stop);
       } while (!stop.stop_requested() && feed.Fetch(stop));
+      // With the images of the first camera, the run ends.
+      if (i > 0 && !stop.stop_requested()) feed.Disconnect();
       gate.Leave(i);
     } catch (...) {
       gate.Leave(i);

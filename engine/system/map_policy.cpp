@@ -54,6 +54,20 @@ void MapPolicy::RejectPose(std::size_t index, TrackedFrame* frame) {
   state_.cameras[index].assignment.SearchAgain();
 }
 
+void MapPolicy::Disconnect(std::size_t index) {
+  SystemCamera& gone = state_.cameras.at(index);
+  gone.is_connected = false;
+  state_.association.SetLost(index);
+  const KnownMap* const map = state_.FindMap(gone.assignment.map());
+  if (!gone.assignment.started_map() || map == nullptr || !map->Exists() || map->snapshot) return;
+  // Until the map has a pose, no camera may search another one: one with images must start it.
+  for (SystemCamera& other : state_.cameras) {
+    if (!other.is_connected || other.assignment.map() != map->key) continue;
+    other.assignment.Start(map->key, map->after_loss);
+    return gone.assignment.WaitFor(map->key);
+  }
+}
+
 void MapPolicy::EnterTrackedMap(std::size_t index, std::uint64_t key, Timestamp time) {
   const std::uint64_t previous = state_.cameras[index].assignment.map();
   state_.cameras[index].assignment.Follow(key);

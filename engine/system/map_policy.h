@@ -31,6 +31,8 @@ class MapPolicy {
 
   // The result of one image; a pose in a map that the cameras have left is taken back.
   void HandleResult(std::size_t index, TrackedFrame* frame);
+  // The camera delivers no images for now; see System::Disconnect.
+  void Disconnect(std::size_t index);
   void HandleMapperEvent(const MapperEvent& event, KnownMap* map);
   MapJoinRequests& joins() { return joins_; }
 

@@ -69,8 +69,7 @@ TrackedFrame System::Process(const Frame& frame) {
 
 void System::Disconnect(std::size_t camera) {
   const std::scoped_lock lock(mutex_);
-  state_.cameras.at(camera).is_connected = false;
-  state_.association.SetLost(camera);
+  policy_.Disconnect(camera);
 }
 
 CameraPlaceFinder System::ApplyOrder(std::size_t index, Timestamp time) {

@@ -272,6 +272,68 @@ TEST(Wearable, FollowsTheRulesOfAssociatedCameras) {
   EXPECT_EQ(cameras.Look(of_room, of_room), Both("room", "room"));
 }
 
+// Images of the test's choice, ten a second.
+class GivenImages : public FrameSource {
+ public:
+  GivenImages(const engine::CameraModel& lens, std::vector<cv::Mat> images) : images_(std::move(images)) {
+    info_.name = "given";
+    info_.known_camera = lens;
+  }
+  bool Next(engine::Frame* frame) override {
+    if (next_ == images_.size()) return false;
+    frame->time = std::chrono::milliseconds(100 * next_);
+    frame->index = next_;
+    frame->image = images_[next_++].clone();
+    return true;
+  }
+
+ private:
+  const std::vector<cv::Mat> images_;
+  std::size_t next_ = 0;
+};
+
+TEST(Wearable, ACameraWhoseRecordingEndsHoldsTheOtherInNoMap) {
+  const TemporaryFolder folder;
+  maps::Library library =
+      maps::Library::Open(folder / "l.docent", maps::Access::kReadWrite, maps::CreateIfMissing::kYes);
+  SimulationOptions simulated;
+  simulated.camera = SimulatedCamera(320);
+  simulated.frame_rate_hz = 20;
+  simulated.duration_s = 5;
+  const auto room = MakeSimulation("room", simulated), desk = MakeSimulation("desks", simulated);
+  MapScene("room", *room, &library);
+  MapScene("desk", *desk, &library);
+  const auto view = [](const Simulation& simulation) {
+    cv::Mat bgr;
+    simulation.Render(simulation.frame_count() - 10, &bgr);
+    return bgr;
+  };
+  std::vector<cv::Mat> first(25, view(*room)), second = first;
+  first.insert(first.end(), 60, view(*desk));
+  for (const Pace pace : {Pace::kLockstep, Pace::kEager}) {
+    CalibratedCamera cameras[2] = {
+        Calibrate(std::make_unique<GivenImages>(room->camera(), first), std::nullopt),
+        Calibrate(std::make_unique<GivenImages>(room->camera(), second), std::nullopt)};
+    SessionOptions options;
+    options.threaded = pace != Pace::kLockstep;
+    options.may_write = false;
+    Session session(options, {cameras[0].model, cameras[1].model}, &library);
+    std::vector<CameraRun> runs(2);
+    std::string last[2];
+    for (int i = 0; i < 2; ++i) {
+      runs[i].camera = &cameras[i];
+      runs[i].options.camera = i;
+      runs[i].options.pace = pace;
+      runs[i].shown = [&, i](const engine::TrackedFrame& frame) {
+        last[i] = engine::HasPose(frame.state) ? session.ShownWith(frame).map_name : "lost";
+      };
+    }
+    RunCameras(runs, &session, {});
+    EXPECT_EQ(last[1], "room") << ToString(pace);
+    EXPECT_EQ(last[0], "desk") << ToString(pace);
+  }
+}
+
 TEST(Wearable, WorksWithOneThreadPerCamera) {
   const WalkOfTwoCameras walk = Take("hand", "shoulder", 8, Pace::kEager);
   EXPECT_EQ(walk.frames[0].size(), 161u);

@@ -128,6 +128,26 @@ TEST_F(PolicyForTwoCameras, StartsNoMapForACameraThatLooksElsewhereWhenTheOtherM
   EXPECT_EQ(state_.active_key, 1u);
 }
 
+TEST_F(PolicyForTwoCameras, LetsTheOtherCameraStartTheMapOfADisconnectedOne) {
+  policy_.StartMap(1, 0, false);
+  for (const std::size_t camera : {0, 1}) NextOrder(camera);
+  Handle(1, 1, TrackingState::kInitializing);
+  policy_.Disconnect(0);
+  Handle(1, 1.03, TrackingState::kInitializing);
+  EXPECT_EQ(NextOrder(1), Order::kStart);
+  EXPECT_EQ(NextOrder(0), Order::kEnter);
+  policy_.Disconnect(1);  // Nobody is left to start it.
+  EXPECT_EQ(NextOrder(0), Order::kNone);
+}
+
+TEST_F(PolicyForTwoCameras, LeavesAMapThatADisconnectedCameraHasStarted) {
+  policy_.StartMap(1, 0, false);
+  for (const std::size_t camera : {0, 1}) NextOrder(camera);
+  MapOf(1).SetSnapshot(MapWithAPoint());
+  policy_.Disconnect(0);
+  EXPECT_EQ(NextOrder(1), Order::kNone);
+}
+
 TEST_F(PolicyForTwoCameras, KeepsAMapWithoutDepthThatNoCameraStarted) {
   EnterMapWithoutDepth(1);
   for (const double seconds : {2.0, 2.2, 9.0}) Lose(0, seconds);
