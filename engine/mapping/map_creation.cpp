@@ -42,9 +42,13 @@ void MapCreation::CreateFromPair(const InitialPair& pair) {
 KeyFrameId MapCreation::AddFirstView(const InitialPair& pair) {
   Map& map = workspace_->map;
   KeyFrameId a = kNoId;
+  // Another camera may have a keyframe of the same time.
+  const auto lens = lens_estimation_->CurrentModel(pair.a.camera ? pair.a.camera : pair.camera);
   for (auto& [id, record] : map.keyframes()) {
     record.keyframe.fixed = false;
-    if (record.keyframe.time == pair.a.time) a = id;
+    if (record.keyframe.time == pair.a.time &&
+        lens_estimation_->CurrentModel(record.keyframe.camera)->HasSameLens(*lens))
+      a = id;
   }
   if (a == kNoId) {
     KeyFrame view;

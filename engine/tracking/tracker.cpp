@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "engine/tracking/tracker.h"
 
+#include <algorithm>
 #include <utility>
 
 #include "engine/base/option_check.h"
@@ -86,10 +87,13 @@ void Tracker::SetMap(std::shared_ptr<const MapSnapshot> map, std::uint64_t map_k
     state_ = TrackedState(confirmation_);
     relocalizer_.LoseLongAgo();
   } else if (initialization_.phase() == MapInitialization::Phase::kPairGiven) {
-    // The mapper made a map of this tracker's pair: its newest keyframe is the latest known pose.
+    // The mapper made a map of this tracker's pair: its newest keyframe is the latest known pose. Another
+    // camera may have added one since.
     initialization_.Finish();
     offers_.Restart();
-    const KeyFrame& newest = map_->keyframes.back();
+    const auto own = std::find_if(map_->keyframes.rbegin(), map_->keyframes.rend(),
+                                  [this](const KeyFrame& k) { return k.camera->HasSameLens(*camera_); });
+    const KeyFrame& newest = own == map_->keyframes.rend() ? map_->keyframes.back() : *own;
     pose_.Begin(newest.time, newest.camera_from_map, ObservedMotion::kSixDof);
     state_ = TrackedState(confirmation_);
   } else if (!same) {

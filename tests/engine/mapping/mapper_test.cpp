@@ -123,6 +123,32 @@ TEST_F(MapperTest, StartsAMapFromTwoViews) {
   EXPECT_TRUE(mapper.IsIdle());
 }
 
+// Two synchronized cameras, of which the other one has the first keyframe of the panorama map.
+TEST_F(MapperTest, TakesNoKeyframeOfAnotherCameraForTheFirstView) {
+  Mapper mapper({});
+  KeyFrameCandidate candidate;
+  candidate.time = pair_->a.time;
+  candidate.camera = testing_world::PinholeCamera(420, 320);
+  const Rigid3 pose = CameraAt({0, 0, 0}, {0, 10, 0});
+  candidate.features = MakeFeatures(world_->Render(*candidate.camera, pose, 1.5, 5));
+  candidate.camera_from_map = pose;
+  candidate.choice = KeyFrameChoice::kFirst;
+  ASSERT_TRUE(mapper.Offer(candidate));
+  WorkUntilIdle(&mapper);
+  ASSERT_TRUE(mapper.Snapshot());
+  ASSERT_EQ(mapper.Snapshot()->keyframes.size(), 1u);
+  ASSERT_TRUE(mapper.Start(*pair_));
+  WorkUntilIdle(&mapper);
+  const MapSnapshot& map = *mapper.Snapshot();
+  EXPECT_EQ(Validate(map), "");
+  ASSERT_EQ(map.keyframes.size(), 3u);
+  EXPECT_TRUE(map.keyframes[0].camera->HasSameLens(*candidate.camera));
+  const KeyFrame& first = map.keyframes[1];
+  EXPECT_TRUE(first.fixed);
+  EXPECT_EQ(first.features, pair_->a.features);
+  EXPECT_TRUE(first.camera->HasSameLens(*MapperCamera()));
+}
+
 TEST_F(MapperTest, ReportsAFailedStart) {
   InitialPair poor = FirstPair(*world_, 30);
   // A blank second image: no points can be added to the thirty.

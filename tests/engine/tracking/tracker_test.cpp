@@ -137,6 +137,28 @@ TEST(Tracker, StartsAMapAndTracksAccurately) {
   EXPECT_EQ(Validate(*walk.map), "");
 }
 
+// Before this tracker learns of its map, another camera has added a keyframe that looks elsewhere.
+TEST(Tracker, BeginsAtItsOwnNewestKeyframe) {
+  Tracker tracker(WithoutPanoramas(), Camera(), 1);
+  Mapper mapper({});
+  tracker.StartNewMap();
+  int i = 0;
+  for (; i < kFramesOfTheWalk && !mapper.Snapshot(); ++i) {
+    tracker.Track(WalkFrame(i), nullptr);
+    if (auto pair = tracker.TakeInitialPair()) mapper.Start(std::move(*pair));
+    mapper.Step();
+  }
+  ASSERT_TRUE(mapper.Snapshot());
+  auto map = std::make_shared<MapSnapshot>(*mapper.Snapshot());
+  KeyFrame other = map->keyframes.back();
+  other.id = map->next_keyframe++;
+  other.camera = testing_world::PinholeCamera(400, 300);
+  other.camera_from_map = CameraAt({0, 0, 0}, {0, 120, 0}) * other.camera_from_map;
+  map->keyframes.push_back(other);
+  tracker.SetMap(map, 1);
+  EXPECT_EQ(tracker.Track(WalkFrame(i), nullptr).state, TrackingState::kSixDof);
+}
+
 TEST(Tracker, PlacesMapPointsOnTheWalls) {
   const TrackedWalk& walk = OneWalk();
   ASSERT_NE(walk.map, nullptr);
