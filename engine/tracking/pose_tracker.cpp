@@ -256,8 +256,12 @@ PoseTracker::Estimate PoseTracker::Track(const MapSnapshot& map, const CameraIma
     map_tracker_.SetPredictedCenter(std::nullopt);
     // A second attempt with larger radii, from the last pose rotated by the alignment of the thumbnails.
     const auto rotation = image.RotationFromPrevious();
-    const Rigid3 rotated = rotation ? motion_.PredictWithRotation(*rotation) : predicted;
-    result = TryFrom(map, image, rotated, MapTracker::Effort::kWide, random);
+    if (rotation) {
+      predicted = motion_.PredictWithRotation(*rotation);
+      if (observed_ == ObservedMotion::kPanorama)
+        predicted = RotatedAbout(pivot_estimate_.pivot, motion_.last(), predicted.rotation);
+    }
+    result = TryFrom(map, image, predicted, MapTracker::Effort::kWide, random);
   }
   if (!criteria_.IsAccepted(result, comparison_) && !criteria_.HoldsTrack(result)) {
     map_tracker_.ForgetLastFrame();
