@@ -177,6 +177,32 @@ void MapScene(const std::string& name, const Simulation& simulation, maps::Libra
   session.Finish();
 }
 
+// A library with a map of a room and one of a desk.
+struct MappedRoomAndDesk {
+  MappedRoomAndDesk() {
+    MapScene("room", *room, &library);
+    MapScene("desk", *desk, &library);
+  }
+  static std::shared_ptr<const Simulation> Simulate(const std::string& scene) {
+    SimulationOptions options;
+    options.camera = SimulatedCamera(320);
+    options.frame_rate_hz = 20;
+    options.duration_s = 5;
+    return MakeSimulation(scene, options);
+  }
+  // What a camera sees near the end of the walk.
+  static cv::Mat ViewOf(const Simulation& simulation) {
+    cv::Mat bgr;
+    simulation.Render(simulation.frame_count() - 10, &bgr);
+    return bgr;
+  }
+
+  const TemporaryFolder folder;
+  maps::Library library =
+      maps::Library::Open(folder / "l.docent", maps::Access::kReadWrite, maps::CreateIfMissing::kYes);
+  const std::shared_ptr<const Simulation> room = Simulate("room"), desk = Simulate("desks");
+};
+
 // Two cameras on a tour, which are shown images of the test's choice.
 class Tourists {
  public:
@@ -224,24 +250,11 @@ class Tourists {
 
 // ptamm Fig. 7 and §3.3, step by step, with images.
 TEST(Wearable, FollowsTheRulesOfAssociatedCameras) {
-  const TemporaryFolder folder;
-  maps::Library library =
-      maps::Library::Open(folder / "l.docent", maps::Access::kReadWrite, maps::CreateIfMissing::kYes);
-  SimulationOptions options;
-  options.camera = SimulatedCamera(320);
-  options.frame_rate_hz = 20;
-  options.duration_s = 5;
-  const auto room = MakeSimulation("room", options), desk = MakeSimulation("desks", options);
-  MapScene("room", *room, &library);
-  MapScene("desk", *desk, &library);
-  const auto image = [](const Simulation& simulation) {
-    cv::Mat bgr;
-    simulation.Render(simulation.frame_count() - 10, &bgr);
-    return bgr;
-  };
-  const cv::Mat of_room = image(*room), of_desk = image(*desk);
+  MappedRoomAndDesk mapped;
+  const cv::Mat of_room = MappedRoomAndDesk::ViewOf(*mapped.room),
+                of_desk = MappedRoomAndDesk::ViewOf(*mapped.desk);
   const cv::Mat dark = cv::Mat::zeros(of_room.size(), of_room.type());
-  Tourists cameras(std::make_shared<engine::CameraModel>(room->camera()), &library);
+  Tourists cameras(std::make_shared<engine::CameraModel>(mapped.room->camera()), &mapped.library);
   using Both = Tourists::MapNamesOfBoth;
 
   // No camera is tracked yet: any map may be entered, and both are tracked in one map.
@@ -293,31 +306,17 @@ class GivenImages : public FrameSource {
 };
 
 TEST(Wearable, ACameraWhoseRecordingEndsHoldsTheOtherInNoMap) {
-  const TemporaryFolder folder;
-  maps::Library library =
-      maps::Library::Open(folder / "l.docent", maps::Access::kReadWrite, maps::CreateIfMissing::kYes);
-  SimulationOptions simulated;
-  simulated.camera = SimulatedCamera(320);
-  simulated.frame_rate_hz = 20;
-  simulated.duration_s = 5;
-  const auto room = MakeSimulation("room", simulated), desk = MakeSimulation("desks", simulated);
-  MapScene("room", *room, &library);
-  MapScene("desk", *desk, &library);
-  const auto view = [](const Simulation& simulation) {
-    cv::Mat bgr;
-    simulation.Render(simulation.frame_count() - 10, &bgr);
-    return bgr;
-  };
-  std::vector<cv::Mat> first(25, view(*room)), second = first;
-  first.insert(first.end(), 60, view(*desk));
+  MappedRoomAndDesk mapped;
+  const engine::CameraModel& lens = mapped.room->camera();
+  std::vector<cv::Mat> first(25, MappedRoomAndDesk::ViewOf(*mapped.room)), second = first;
+  first.insert(first.end(), 60, MappedRoomAndDesk::ViewOf(*mapped.desk));
   for (const Pace pace : {Pace::kLockstep, Pace::kEager}) {
-    CalibratedCamera cameras[2] = {
-        Calibrate(std::make_unique<GivenImages>(room->camera(), first), std::nullopt),
-        Calibrate(std::make_unique<GivenImages>(room->camera(), second), std::nullopt)};
+    CalibratedCamera cameras[2] = {Calibrate(std::make_unique<GivenImages>(lens, first), std::nullopt),
+                                   Calibrate(std::make_unique<GivenImages>(lens, second), std::nullopt)};
     SessionOptions options;
     options.threaded = pace != Pace::kLockstep;
     options.may_write = false;
-    Session session(options, {cameras[0].model, cameras[1].model}, &library);
+    Session session(options, {cameras[0].model, cameras[1].model}, &mapped.library);
     std::vector<CameraRun> runs(2);
     std::string last[2];
     for (int i = 0; i < 2; ++i) {
