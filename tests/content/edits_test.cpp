@@ -119,14 +119,20 @@ TEST(Edits, UndoAndRedoFollowAMovedAnchor) {
   }
 }
 
-TEST(EditHistory, AbsentEntitiesOfOneNameAreMovedApart) {
-  Scene scene;
+// A fox was removed, and then another one added under the same name.
+EditHistory HistoryOfTwoFoxes(Scene* scene) {
   EditHistory history;
   Entity second = ModelEntity("fox");
   second.model.map_from_model.translation = {10, 0, 0};
-  history.Do(AddEdit(scene, ModelEntity("fox")), &scene);
-  history.Do(RemoveEdit(scene, {"fox"}), &scene);
-  history.Do(AddEdit(scene, second), &scene);
+  history.Do(AddEdit(*scene, ModelEntity("fox")), scene);
+  history.Do(RemoveEdit(*scene, {"fox"}), scene);
+  history.Do(AddEdit(*scene, second), scene);
+  return history;
+}
+
+TEST(EditHistory, AbsentEntitiesOfOneNameAreMovedApart) {
+  Scene scene;
+  EditHistory history = HistoryOfTwoFoxes(&scene);
   history.Do(RemoveEdit(scene, {"fox"}), &scene);
   const std::vector<AbsentEntity> absent = history.Absent(5);
   ASSERT_EQ(absent.size(), 2u);
@@ -146,12 +152,7 @@ TEST(EditHistory, AbsentEntitiesOfOneNameAreMovedApart) {
 
 TEST(EditHistory, OnlyTheEntityThatHasTheNameNowFollowsItsAnchor) {
   Scene scene;
-  EditHistory history;
-  Entity second = ModelEntity("fox");
-  second.model.map_from_model.translation = {10, 0, 0};
-  history.Do(AddEdit(scene, ModelEntity("fox")), &scene);
-  history.Do(RemoveEdit(scene, {"fox"}), &scene);
-  history.Do(AddEdit(scene, second), &scene);
+  EditHistory history = HistoryOfTwoFoxes(&scene);
   history.MoveWithAnchor("fox", {{}, {0, 0, 5}, 1});
   ASSERT_TRUE(history.Undo(&scene));
   ASSERT_TRUE(history.Undo(&scene));
