@@ -21,8 +21,10 @@ class MotionModel {
     twist_per_second_.setZero();
   }
   void Update(Timestamp time, const Rigid3& camera_from_map) {
-    const double seconds = ToSeconds(time - time_);
+    const double seconds = SecondsUntil(time);
     if (seconds > 0) {
+      const double usual = usual_interval_s_ > 0 ? usual_interval_s_ : seconds;
+      usual_interval_s_ = 0.9 * usual + 0.1 * std::min(seconds, 2 * usual);
       const Eigen::Matrix<double, 6, 1> measured =
           (camera_from_map * camera_from_map_.inverse()).Log() / seconds;
       // Low-pass filter: hand-held motion is smooth, single measurements are noisy.
@@ -61,6 +63,13 @@ class MotionModel {
     camera_from_map_ = CorrectedPose(camera_from_map_, after_from_before);
     twist_per_second_.head<3>() *= after_from_before.scale;
   }
+  // The time since the last pose, to divide a motion by: not less than half of the usual interval, since
+  // times are those of arrival where a driver or a file states no better ones, and one of a millisecond would
+  // make the motion that belongs to a whole interval thirty times as fast. At most 0 for the past.
+  double SecondsUntil(Timestamp time) const {
+    const double seconds = ToSeconds(time - time_);
+    return seconds > 0 ? std::max(seconds, 0.5 * usual_interval_s_) : seconds;
+  }
   // Of the last pose: its time, and its left twist (translation, rotation) per second.
   const Eigen::Matrix<double, 6, 1>& twist_per_second() const { return twist_per_second_; }
   Timestamp time() const { return time_; }
@@ -68,6 +77,7 @@ class MotionModel {
 
  private:
   Timestamp time_{};
+  double usual_interval_s_ = 0;  // between two poses; 0 if not known yet
   Rigid3 camera_from_map_;
   std::optional<Rigid3> before_miss_;  // the pose before the last frame, if that one has none
   Eigen::Matrix<double, 6, 1> twist_per_second_ = Eigen::Matrix<double, 6, 1>::Zero();

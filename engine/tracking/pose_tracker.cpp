@@ -215,7 +215,7 @@ void PoseTracker::SetTwist(const Eigen::Matrix<double, 6, 1>& twist) {
 void PoseTracker::AccountForReadout(const CameraImage& image, const Rigid3& predicted,
                                     MapTrackResult* result) {
   if (!options_.readout.enabled) return;
-  const double seconds = ToSeconds(image.time - motion_.time());
+  const double seconds = motion_.SecondsUntil(image.time);
   if (!(seconds > 0)) return;
   const auto mean_twist = [&] {
     return Eigen::Matrix<double, 6, 1>((result->camera_from_map * motion_.last().inverse()).Log() / seconds);

@@ -26,6 +26,17 @@ TEST(MotionModel, LearnsAConstantVelocity) {
   EXPECT_TRUE(IsNear(model.Predict(FromSeconds(23 / 30.0)), Screw(23 / 30.0), 1e-4, 1e-4));
 }
 
+TEST(MotionModel, KeepsTheVelocityWhereTwoImagesHaveNearlyTheSameTime) {
+  MotionModel model;
+  model.Reset(FromSeconds(0), Screw(0));
+  for (int i = 1; i <= 20; ++i) model.Update(FromSeconds(i / 30.0), Screw(i / 30.0));
+  const double velocity = model.twist_per_second().norm();
+  model.Update(FromSeconds(20 / 30.0 + 0.001), Screw(21 / 30.0));  // stamped when it arrived
+  EXPECT_LT(model.twist_per_second().norm(), 2 * velocity);
+  EXPECT_NEAR(model.SecondsUntil(FromSeconds(22 / 30.0)), 2 / 30.0 - 0.001, 1e-9);
+  EXPECT_LE(model.SecondsUntil(FromSeconds(20 / 30.0)), 0);
+}
+
 TEST(MotionModel, PredictsNoMotionAfterAResetOrForThePast) {
   MotionModel model;
   for (int i = 0; i <= 5; ++i) model.Update(FromSeconds(i / 30.0), Screw(i / 30.0));
