@@ -23,7 +23,8 @@ struct RigOptions {
   double viewpoint_rotation_deg = 3;       // see min_viewpoints
   double max_rigid_position_sigma = 0.02;  // ratio of the baseline; robust sigma of the relative position
   double max_rigid_rotation_deg = 0.5;     // robust sigma of the relative rotation
-  Timestamp max_gap = std::chrono::milliseconds(120);  // between poses that are interpolated
+  // Between poses that are interpolated: the longest interval of a camera with eight images a second.
+  Timestamp max_gap = std::chrono::milliseconds(150);
 
   // Describes the first invalid option in one sentence, or empty.
   std::optional<std::string> Validate() const;

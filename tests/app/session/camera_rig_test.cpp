@@ -44,9 +44,14 @@ Errors Compare(const engine::RigEstimate& estimate) {
           (estimate.second_from_first.rotation.inverse() * kTruth.rotation).Angle() / kRadPerDegree};
 }
 
-// Two cameras at 30 and 25 frames per second. Each pose has the noise of a tracker, one in ten is an outlier.
-// arm: motion of the second camera relative to the rig, by time.
-engine::CameraRig Watch(double seconds, const std::function<Rigid3(double)>& arm, std::uint64_t map_key = 1) {
+struct Intervals {
+  int first_ms = 33, second_ms = 40;
+};
+
+// Two cameras, at 30 and 25 frames per second where nothing else is given. Each pose has the noise of a
+// tracker, one in ten is an outlier. arm: motion of the second camera relative to the rig, by time.
+engine::CameraRig Watch(double seconds, const std::function<Rigid3(double)>& arm, std::uint64_t map_key = 1,
+                        const Intervals& intervals = {}) {
   engine::CameraRig rig;
   Random random(5);
   const auto noisy = [&](const Rigid3& pose) {
@@ -56,8 +61,8 @@ engine::CameraRig Watch(double seconds, const std::function<Rigid3(double)>& arm
   };
   for (int tick = 0; tick * 1e-3 < seconds; ++tick) {
     const double time = tick * 1e-3;
-    if (tick % 33 == 0) rig.Add(0, FromSeconds(time), map_key, noisy(FirstFromMap(time)));
-    if (tick % 40 == 7)
+    if (tick % intervals.first_ms == 0) rig.Add(0, FromSeconds(time), map_key, noisy(FirstFromMap(time)));
+    if (tick % intervals.second_ms == 7)
       rig.Add(1, FromSeconds(time), map_key, noisy(arm(time) * kTruth * FirstFromMap(time)));
   }
   return rig;
@@ -86,6 +91,13 @@ TEST(Rig, IsRecognizedAsRigidFromUnsynchronizedCameras) {
   EXPECT_TRUE(rig.estimate()->rigid) << TextOf(*rig.estimate());
   EXPECT_LT(Compare(*rig.estimate()).baseline, 0.01);
   EXPECT_LT(Compare(*rig.estimate()).turn_deg, 0.3);
+}
+
+TEST(Rig, IsRecognizedAtEightImagesASecond) {
+  const engine::CameraRig rig = Watch(20, [](double) { return Rigid3(); }, 1, {125, 125});
+  ASSERT_TRUE(rig.estimate());
+  EXPECT_TRUE(rig.estimate()->rigid) << TextOf(*rig.estimate());
+  EXPECT_TRUE(rig.Predict(1, FromSeconds(20), 1));
 }
 
 TEST(Rig, IsNotRigidWhenTheCamerasMoveRelativeToEachOther) {
