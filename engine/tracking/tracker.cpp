@@ -292,6 +292,7 @@ void Tracker::Accept(const MapTrackResult& result, TrackedFrame* out) {
     better_maps_.Restart();
     relocalizer_.Succeed();
     offers_.Restart();
+    hypothesis_ = {};  // of the loss that ends here
   } else {
     may_extend = confirmation_.Add(result, good);
   }
