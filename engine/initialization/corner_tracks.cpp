@@ -90,6 +90,7 @@ std::optional<std::string> CornerTracksOptions::Validate() const {
       .Ratio(min_alive_ratio, "ratio of tracked corners")
       .AtLeast(min_alive, 0, "number of tracked corners")
       .AtLeast(max_age_frames, 1, "age of the first view")
+      .AtLeast(ToSeconds(max_age), 0, "age of the first view")
       .Ratio(next_view_alive_ratio, "ratio of tracked corners")
       .Within(max_views, 1, static_cast<double>(CornerTracks::kMaxViews), "number of first views")
       .fault();
@@ -227,7 +228,8 @@ void CornerTracks::EndViews() {
     const bool too_few =
         !HasEnough(view) || static_cast<double>(view.alive) <
                                 options_.min_alive_ratio * static_cast<double>(view.corners_at_start);
-    const bool ends = too_few || view.age_frames > options_.max_age_frames;
+    const bool ends = too_few || (view.age_frames > options_.max_age_frames &&
+                                  previous_time_ - view.time > options_.max_age);
     if (ends) {
       for (Trail& trail : trails_) trail.views = static_cast<std::uint8_t>(trail.views & ~(1U << view.slot));
     }

@@ -27,7 +27,9 @@ struct CornerTracksOptions {
   int plain_scene_corners = 200;
   double min_alive_ratio = 0.3;  // of the corners of a first view; with fewer, it ends
   int min_alive = 80;            // corners; with fewer, a first view ends
-  int max_age_frames = 240;      // a first view older than this ends
+  int max_age_frames = 240;      // a first view that is older than this and than max_age ends
+  // The time of 240 images at 30 a second: a camera with more images a second needs as long to move.
+  Timestamp max_age = std::chrono::seconds(8);
   // In a plain scene, once fewer corners of the newest first view than this ratio are left, the image becomes
   // a further first view, and corners are added where none are left. In fast motion, the corners of a first
   // view are lost just before their parallax is significant, and with a single one it is chance whether that

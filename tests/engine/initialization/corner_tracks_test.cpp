@@ -138,6 +138,22 @@ TEST(CornerTracks, TellTheMotionSinceEachFirstView) {
   }
 }
 
+TEST(CornerTracks, KeepAFirstViewForSecondsHoweverManyImagesThereAre) {
+  const RenderedWorld world = RenderedWorld::Room(51);
+  const auto features = MakeFeatures(world.Render(*Camera(), CameraAt({0, 0, 0}), 1.5, 1));
+  CornerTracksOptions options;
+  options.max_age_frames = 20;
+  options.max_age = std::chrono::seconds(1);
+  CornerTracks tracks(options);
+  tracks.Start({}, features);
+  for (int i = 1; i <= 120; ++i) {
+    tracks.Track(FromSeconds(i / 120.0), features, *Camera(), Rotation3());
+    ASSERT_EQ(tracks.views().front().time, Timestamp{}) << i;
+  }
+  tracks.Track(FromSeconds(121 / 120.0), features, *Camera(), Rotation3());
+  EXPECT_EQ(tracks.views().front().time, FromSeconds(121 / 120.0));
+}
+
 TEST(CornerTracks, StartAgainWhereTooFewCornersAreLeft) {
   const CornerTracks tracks = FollowObject({}, 33);
   ASSERT_EQ(tracks.views().size(), 1u);
