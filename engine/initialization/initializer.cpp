@@ -87,6 +87,7 @@ void Initializer::UpdateProgress(double progress) {
 std::optional<InitialPair> Initializer::Track(Timestamp time,
                                               const std::shared_ptr<const ImageFeatures>& features) {
   if (ended_) Reset();
+  if (tracks_.started() && AreEqual(*tracks_.newest(), *features)) return std::nullopt;
   if (tracks_.started()) {
     TrackCorners(time, features);
   } else {
@@ -132,6 +133,7 @@ void Initializer::EndWith(const InitialPair& pair) {
 
 std::optional<TrackedCorners> Initializer::Follow(Timestamp time,
                                                   const std::shared_ptr<const ImageFeatures>& features) {
+  if (AreEqual(*tracks_.newest(), *features)) return std::nullopt;
   const Timestamp first = tracks_.views().front().time;
   TrackCorners(time, features);
   const CornerTracks::FirstView& view = tracks_.views().front();

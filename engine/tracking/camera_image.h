@@ -17,6 +17,9 @@ struct CameraImage {
   std::shared_ptr<const CameraModel> camera;  // once it is tracked, with its motion during the readout
   std::shared_ptr<const ImageFeatures> features;
   std::shared_ptr<const ImageFeatures> previous;  // null for the first image
+  // The previous image was delivered again, with another time: recordings of 15 images a second are stored
+  // with 30 like this. The camera moves on, but nothing is to be measured from this image.
+  bool is_repeated = false;
 
   // The rotation since the previous image, by aligning the thumbnails; empty if they do not match.
   std::optional<Rotation3> RotationFromPrevious() const;

@@ -214,7 +214,7 @@ void PoseTracker::SetTwist(const Eigen::Matrix<double, 6, 1>& twist) {
 
 void PoseTracker::AccountForReadout(const CameraImage& image, const Rigid3& predicted,
                                     MapTrackResult* result) {
-  if (!options_.readout.enabled) return;
+  if (!options_.readout.enabled || image.is_repeated) return;
   const double seconds = motion_.SecondsUntil(image.time);
   if (!(seconds > 0)) return;
   const auto mean_twist = [&] {
@@ -242,6 +242,7 @@ PoseTracker::Estimate PoseTracker::Track(const MapSnapshot& map, const CameraIma
   using Outcome = Estimate::Outcome;
   // A commanded rotation is more accurate than the motion model.
   Rigid3 predicted = commanded ? motion_.PredictWithRotation(*commanded) : motion_.Predict(image.time);
+  if (image.is_repeated) predicted = motion_.last();
   if (observed_ == ObservedMotion::kPanorama)
     predicted = RotatedAbout(pivot_estimate_.pivot, motion_.last(), predicted.rotation);
   if (options_.readout.enabled) {
@@ -357,10 +358,11 @@ void PoseTracker::Accept(const CameraImage& image, const MapTrackResult& result,
     motion_.Reset(image.time, result.camera_from_map);
     rotation_center_.Reset();
     position_.Reset();
-  } else {
+  } else if (!image.is_repeated) {
     motion_.Update(image.time, result.camera_from_map);
   }
-  rotation_rate_ = (result.camera_from_map.rotation * previous_rotation.inverse()).Log();
+  if (!image.is_repeated)
+    rotation_rate_ = (result.camera_from_map.rotation * previous_rotation.inverse()).Log();
   observed_ = result.observed;
   inliers_ = result.inliers;
   finite_coverage_ = result.finite_coverage;

@@ -127,6 +127,7 @@ void Tracker::Track(const Frame& frame, const PlaceFinder* places, TrackedFrame*
   image_.camera = camera_;
   image_.previous = std::exchange(image_.features, nullptr);
   image_.features = extractor_.Extract(frame.image);
+  image_.is_repeated = image_.previous && AreEqual(*image_.previous, *image_.features);
   searched_ = map_ && IsTracked(state_);
   corners_ = initialization_.FollowCorners(image_);
 
@@ -291,8 +292,8 @@ void Tracker::Accept(const MapTrackResult& result, TrackedFrame* out) {
                                  .median_depth = pose_.median_depth()});
     better_maps_.Restart();
     relocalizer_.Succeed();
-    offers_.Restart();
     hypothesis_ = {};  // of the loss that ends here
+    offers_.Restart();
   } else {
     may_extend = confirmation_.Add(result, good);
   }

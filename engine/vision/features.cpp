@@ -71,4 +71,13 @@ std::shared_ptr<const ImageFeatures> MakeFeatures(const cv::Mat& gray, const Fea
   return features;
 }
 
+bool AreEqual(const ImageFeatures& a, const ImageFeatures& b) {
+  const cv::Mat &first = a.levels.back(), &second = b.levels.back();
+  if (first.size() != second.size()) return false;
+  for (int y = 0; y < first.rows; ++y) {
+    if (!std::equal(first.ptr(y), first.ptr(y) + first.cols, second.ptr(y))) return false;
+  }
+  return true;
+}
+
 }  // namespace docent::engine

@@ -29,4 +29,8 @@ void ExtractFeatures(const cv::Mat& gray, const FeatureOptions& options,
 // alone. Throws Error if the options are invalid.
 std::shared_ptr<const ImageFeatures> MakeFeatures(const cv::Mat& gray, const FeatureOptions& options = {});
 
+// Whether both images are equal in every pixel of the coarsest level. The noise of a camera makes any two of
+// its images differ there, so that only an image that was delivered twice is equal to the one before.
+bool AreEqual(const ImageFeatures& a, const ImageFeatures& b);
+
 }  // namespace docent::engine

@@ -166,6 +166,29 @@ TEST(Initializer, AsksForDetailInABlankImage) {
   }
 }
 
+TEST(Initializer, MeasuresNothingFromAnImageThatIsDeliveredAgain) {
+  const RenderedWorld world = RenderedWorld::Room(51);
+  const auto frames_until_depth = [&](int deliveries) {
+    Initializer initializer({}, Camera(), 5);
+    for (int i = 0; i < 60; ++i) {
+      const auto features = MakeFeatures(
+          world.Render(*Camera(), CameraAt({0.012 * i, 0, 0}), 1.5, static_cast<std::uint64_t>(i) + 1));
+      for (int k = 0; k < deliveries; ++k) {
+        const Timestamp time = FromSeconds((i + static_cast<double>(k) / deliveries) / 30.0);
+        const auto again = std::make_shared<ImageFeatures>(*features);
+        if (const auto pair = initializer.Track(time, again)) {
+          EXPECT_EQ(pair->b.time, FromSeconds(i / 30.0)) << "when it was delivered first";
+          return i;
+        }
+      }
+    }
+    return 60;
+  };
+  const int once = frames_until_depth(1);
+  EXPECT_LT(once, 60);
+  EXPECT_EQ(frames_until_depth(2), once);
+}
+
 TEST(Initializer, StartsAgainAfterAReset) {
   const RenderedWorld world = RenderedWorld::Room(55);
   Initializer initializer({}, Camera(), 5);

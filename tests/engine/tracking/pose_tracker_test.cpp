@@ -57,6 +57,22 @@ TEST_F(KnownRoom, IsTrackedFromFrameToFrame) {
   EXPECT_NEAR(tracker_.median_depth(), 2.5, 1);
 }
 
+TEST_F(KnownRoom, KeepsItsMotionWhereEachImageIsDeliveredTwice) {
+  tracker_.Begin(ImageAt(Pose(0)).time, Pose(0), ObservedMotion::kSixDof);
+  for (int i = 1; i <= 16; ++i) {
+    CameraImage image = ImageAt(Pose(i / 2 * 2), i);
+    image.is_repeated = i % 2 != 0;
+    const auto estimate = Track(image);
+    ASSERT_EQ(estimate.outcome, Outcome::kPose) << i;
+    EXPECT_LT((estimate.result.camera_from_map.OriginInSource() - Pose(i / 2 * 2).OriginInSource()).norm(),
+              0.01);
+    tracker_.Accept(image, estimate.result, false);
+    if (i < 2) continue;
+    // Two steps of 0.2 degrees from one image to the next one that differs.
+    EXPECT_NEAR(tracker_.rotation_rate().norm(), 0.4 * M_PI / 180, 0.004) << i;
+  }
+}
+
 TEST_F(KnownRoom, IsLostWhenTheImageShowsNothingOfIt) {
   Walk(4);
   const RenderedWorld other = RenderedWorld::Room(7177);
