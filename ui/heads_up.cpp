@@ -50,7 +50,7 @@ Color QualityColor(engine::TrackingQuality quality) {
   switch (quality) {
     case engine::TrackingQuality::kGood:
       return kGood;
-    case engine::TrackingQuality::kBad:
+    case engine::TrackingQuality::kPoor:
       return kFair;
     case engine::TrackingQuality::kLost:
       return kPoor;

@@ -53,8 +53,8 @@ const char* ToString(engine::TrackingQuality quality) {
   switch (quality) {
     case engine::TrackingQuality::kGood:
       return "good";
-    case engine::TrackingQuality::kBad:
-      return "bad";
+    case engine::TrackingQuality::kPoor:
+      return "poor";
     case engine::TrackingQuality::kLost:
       return "lost";
   }

@@ -35,7 +35,7 @@ const char* ToString(TrackingState state);  // a word in lower case
 bool HasPose(TrackingState state);
 
 // Class of the inlier ratio (ptamm §2.1).
-enum class TrackingQuality : std::uint8_t { kGood, kBad, kLost };
+enum class TrackingQuality : std::uint8_t { kGood, kPoor, kLost };
 
 // The tracker's result for one frame. It holds image, pose and map together, so that they are always
 // consistent.

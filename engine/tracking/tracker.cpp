@@ -325,7 +325,7 @@ void Tracker::SetPose(const MapTrackResult& result, bool good, TrackedFrame* out
   out->camera_from_map = result.camera_from_map;
   out->covariance = result.covariance;
   out->quality = result.Quality();
-  out->quality_class = good ? TrackingQuality::kGood : TrackingQuality::kBad;
+  out->quality_class = good ? TrackingQuality::kGood : TrackingQuality::kPoor;
   out->finite_points = result.finite_inliers;
   out->infinite_points = result.inliers - result.finite_inliers;
 }

@@ -35,7 +35,7 @@ TEST(MappingStatus, IsExtendingWhileKeyFramesAreAddedAndMappedAfterwards) {
 
 TEST(MappingStatus, IsLimitedWhenTrackingIsNotGood) {
   engine::TrackedFrame frame = FrameAt(5, 4);
-  frame.quality_class = engine::TrackingQuality::kBad;
+  frame.quality_class = engine::TrackingQuality::kPoor;
   EXPECT_EQ(MappingStatusOf(frame, true), MappingStatus::kLimited);
   frame = FrameAt(5, 4);
   for (const auto state :
