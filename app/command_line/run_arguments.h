@@ -34,10 +34,8 @@ void AddMemoryOption(CLI::App* command, std::size_t* bytes);
 void AddCameraFormatOption(CLI::App* command, CameraOptions* options);
 // Adds --lens: auto, or the name of a lens model.
 void AddLensOption(CLI::App* command, std::optional<engine::LensModel>* lens);
-// Adds the options that all subcommands with tracking share: --camera, --calibration, --camera-format,
-// --from,
-// --until, --sound, --language, --pace, --engine, --seed, --memory-budget, --baseline, --head, --headless,
-// --output and --record. `auto_calibration` is the help on `--calibration auto`.
+// Adds the options that all subcommands with tracking share. `auto_calibration` is the help on
+// `--calibration auto`.
 void AddRunArguments(CLI::App* command, const std::string& auto_calibration, RunArguments* run);
 // The language of the locale in the environment; empty if it names none.
 std::string LanguageOfEnvironment();

@@ -10,9 +10,8 @@
 
 namespace docent::app {
 
-// Formats report.json: one object for each sequence under `sequences`, with the fields of
-// docs/output-files.md and also `engine`, `last_tracked_frame`, `discarded_frames`, `directions_only_frames`,
-// `turn_error_deg`, `maps` and `segments`. Unknown values are null. `compared` holds the same sequences with
+// Formats report.json: one object for each sequence under `sequences`, with the fields that
+// docs/output-files.md describes. Unknown values are null. `compared` holds the same sequences with
 // the other engine, in a field of that name; the field is omitted when it is empty.
 std::string FormatJsonReport(const std::vector<SequenceReport>& reports,
                              const std::vector<SequenceReport>& compared = {});

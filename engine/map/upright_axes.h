@@ -5,9 +5,9 @@
 
 #include "engine/map/map_snapshot.h"
 
-// Which way is up in a map. Everything that stands upright (content), or is seen from above (the map view,
-// plans, grids of places), uses this one definition; docs/coordinates.md explains it. Pure functions; any
-// thread.
+// Which way is up in a map, as its keyframes suggest. What is seen from above (the map view, plans, grids of
+// places) uses this direction, and so does upright content unless an author has shown the floor
+// (app/session/map_axes.h); docs/coordinates.md explains it. Pure functions; any thread.
 namespace docent::engine {
 
 // Right-handed axes of the map's horizontal plane and its normal; unit vectors in the map.
