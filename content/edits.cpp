@@ -137,7 +137,7 @@ Eigen::Vector3d BesideOffset(const Entity& entity) {
   constexpr double kGap = 1.1;  // Ratio of the width.
   switch (entity.kind) {
     case Entity::Kind::kSignpost:
-      return kGap * entity.signpost.height_m * entity.signpost.up.unitOrthogonal();
+      return kGap * entity.signpost.height * entity.signpost.up.unitOrthogonal();
     case Entity::Kind::kLabel:
       return 2 * kGap * entity.label.text_height * entity.label.up;
     case Entity::Kind::kSound:

@@ -109,7 +109,7 @@ void ReadSignpost(std::string_view where, const std::string& place, const Json& 
   entity->signpost.text = reader.Text("text");
   entity->signpost.anchor = reader.Vector<3>("anchor_m", kMaxCoordinate);
   entity->signpost.up = reader.UnitVector<3>("up");
-  entity->signpost.height_m = reader.Number("height_m", kMinBoardHeight, kMaxBoardHeight);
+  entity->signpost.height = reader.Number("height_m", kMinBoardHeight, kMaxBoardHeight);
   entity->signpost.to_map = reader.Text("to_map");
   if (version > 1) entity->signpost.to_key = reader.Key("to_key");
   if (version > 2) entity->signpost.translations = reader.TextByLanguage("translations");
@@ -205,7 +205,7 @@ Entity::Kind ReadKind(std::string_view where, const std::string& place, const Js
 
 Json KindToJson(const Signpost& signpost) {
   Json json{{"text", signpost.text},           {"anchor_m", VectorToJson(signpost.anchor)},
-            {"up", VectorToJson(signpost.up)}, {"height_m", signpost.height_m},
+            {"up", VectorToJson(signpost.up)}, {"height_m", signpost.height},
             {"to_map", signpost.to_map},       {"to_key", signpost.to_key}};
   if (signpost.direction) json["direction"] = VectorToJson(*signpost.direction);
   return json;

@@ -47,7 +47,7 @@ Eigen::Vector3d PlaceOf(const Entity& entity) {
 }
 
 Eigen::Vector3d BoardMiddle(const Signpost& signpost) {
-  return signpost.anchor + (kSignpostPole + 0.5) * signpost.height_m * signpost.up;
+  return signpost.anchor + (kSignpostPole + 0.5) * signpost.height * signpost.up;
 }
 
 void LeadNowhere(Signpost* signpost) {
@@ -64,7 +64,7 @@ engine::Sim3 PoseOf(const Entity& entity) {
     case Entity::Kind::kImage:
       return entity.model.map_from_model;
     case Entity::Kind::kSignpost:
-      pose.scale = entity.signpost.height_m;
+      pose.scale = entity.signpost.height;
       break;
     case Entity::Kind::kLabel:
       pose.scale = entity.label.text_height;
@@ -90,7 +90,7 @@ void SetPose(const engine::Sim3& pose, Entity* entity) {
       break;
     case Entity::Kind::kSignpost:
       entity->signpost.anchor = pose.translation;
-      entity->signpost.height_m = pose.scale;
+      entity->signpost.height = pose.scale;
       break;
     case Entity::Kind::kLabel:
       entity->label.anchor = pose.translation;
@@ -119,7 +119,7 @@ void TransformBy(const engine::Sim3& motion, Entity* entity) {
     case Entity::Kind::kSignpost:
       entity->signpost.anchor = motion * entity->signpost.anchor;
       entity->signpost.up = motion.rotation * entity->signpost.up;
-      entity->signpost.height_m *= motion.scale;
+      entity->signpost.height *= motion.scale;
       if (entity->signpost.direction)
         entity->signpost.direction = motion.rotation * *entity->signpost.direction;
       break;

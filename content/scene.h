@@ -84,7 +84,7 @@ struct Signpost {
   Translations translations;                         // Its variants in other languages, UTF-8.
   Eigen::Vector3d anchor = Eigen::Vector3d::Zero();  // In the map, map units.
   Eigen::Vector3d up = -Eigen::Vector3d::UnitY();    // Unit vector in the map.
-  double height_m = 0.1;                             // Height of the board, in map units.
+  double height = 0.1;                               // Height of the board, in map units.
   std::uint64_t to_key = 0;  // Key of the map it leads to in the library; 0 for none, or if it is not known.
   // Name of the map it leads to when this was written, empty for none. Where there is a map with the key, its
   // name is shown instead.

@@ -126,7 +126,7 @@ std::string PoseProblem(const Entity& entity) {
       return ModelPoseProblem(entity.model.map_from_model);
     case Entity::Kind::kSignpost:
       return First({PointProblem(entity.signpost.anchor),
-                    RangeProblem("a height", entity.signpost.height_m, kMinBoardHeight, kMaxBoardHeight),
+                    RangeProblem("a height", entity.signpost.height, kMinBoardHeight, kMaxBoardHeight),
                     UpProblem(entity.signpost.up), DirectionProblem(entity.signpost.direction)});
     case Entity::Kind::kLabel:
       return First({PointProblem(entity.label.anchor), PointProblem(entity.label.offset),

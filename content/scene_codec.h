@@ -31,7 +31,8 @@
 //      "map_from_shape": as map_from_model},
 //     {"kind": "occluder", …, "shape": "polygon", "outline": [[x, y]…], "map_from_shape": as above}]}
 //
-// where … stands for name, locked, hidden and group.
+// where … stands for name, locked, hidden and group. Lengths are in map units; their suffix _m is kept,
+// because libraries that exist have it.
 //
 // Numbers are written so that they read back to the same bits (rotations are normalized again). Version 1,
 // without locked, hidden, group and to_key, version 2, without translations and the kinds after signposts,

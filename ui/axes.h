@@ -47,17 +47,17 @@ struct TangentBounds {
 };
 
 // Projects from OpenGL eye coordinates to OpenGL clip coordinates for a pinhole camera with these bounds. The
-// depth buffer covers depths from near_m to far_m (both positive, in map units).
-inline glm::mat4 GlClipFromGlEye(const TangentBounds& bounds, double near_m, double far_m) {
+// depth buffer covers depths from near_plane to far_plane (both positive, in map units).
+inline glm::mat4 GlClipFromGlEye(const TangentBounds& bounds, double near_plane, double far_plane) {
   const double width = bounds.right - bounds.left, height = bounds.bottom - bounds.top;
   glm::mat4 clip(0.0f);
   clip[0][0] = static_cast<float>(2.0 / width);
   clip[2][0] = static_cast<float>((bounds.right + bounds.left) / width);
   clip[1][1] = static_cast<float>(2.0 / height);
   clip[2][1] = static_cast<float>(-(bounds.top + bounds.bottom) / height);
-  clip[2][2] = static_cast<float>(-(far_m + near_m) / (far_m - near_m));
+  clip[2][2] = static_cast<float>(-(far_plane + near_plane) / (far_plane - near_plane));
   clip[2][3] = -1.0f;
-  clip[3][2] = static_cast<float>(-2.0 * far_m * near_m / (far_m - near_m));
+  clip[3][2] = static_cast<float>(-2.0 * far_plane * near_plane / (far_plane - near_plane));
   return clip;
 }
 

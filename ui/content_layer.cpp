@@ -174,8 +174,8 @@ void ContentLayer::BindForComposite(const Lens& lens, const MeshDrawer::DepthRan
   glUniform1i(program.Uniform("has_surfaces"), !surface_drawer_.empty());
   glUniform1i(program.Uniform("has_shadows"), with_shadows);
   glUniform1f(program.Uniform("depth_bias"), kDepthBias);
-  glUniform2f(program.Uniform("depth_range"), static_cast<float>(range.near_m()),
-              static_cast<float>(range.far_m()));
+  glUniform2f(program.Uniform("depth_range"), static_cast<float>(range.near_plane()),
+              static_cast<float>(range.far_plane()));
   SetDegradation(program, what.degradation, what.camera_pixel);
   const GLuint textures[] = {lens.lookup.name(),
                              lens.atlas->texture(),

@@ -163,9 +163,9 @@ engine::Sim3 LabelPose(const content::Label& label, const Eigen::Vector3d& eye_i
   board.anchor = label.anchor + label.offset;
   board.up = label.up;
   const double distance = (eye_in_map - board.anchor).norm();
-  board.height_m = distance > 0
-                       ? std::clamp(label.text_height, kLeastTextAngle * distance, kMostTextAngle * distance)
-                       : label.text_height;
+  board.height = distance > 0
+                     ? std::clamp(label.text_height, kLeastTextAngle * distance, kMostTextAngle * distance)
+                     : label.text_height;
   return SignpostPose(board, eye_in_map);
 }
 
@@ -202,7 +202,7 @@ std::vector<Eigen::AlignedBox2d> SignBoards(const content::Scene& scene, const e
     const Eigen::Vector3d middle = camera_from_map * content::BoardMiddle(entity.signpost);
     const auto pixel = camera.Project(middle);
     if (!pixel || !camera.IsInside(*pixel)) continue;
-    const auto above = camera.Project(middle - 0.5 * entity.signpost.height_m * Eigen::Vector3d::UnitY());
+    const auto above = camera.Project(middle - 0.5 * entity.signpost.height * Eigen::Vector3d::UnitY());
     if (!above) continue;
     const double half = (*above - *pixel).norm();
     const Eigen::Vector2d reach(2 * kHalfWidth * half, half);

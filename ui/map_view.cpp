@@ -48,19 +48,18 @@ class Drawing {
   Drawing(const engine::CameraModel& camera, const engine::Rigid3& camera_from_map, Canvas* canvas)
       : camera_(camera), camera_from_map_(camera_from_map), canvas_(canvas) {}
 
-  // Draws a horizontal grid through the target with a spacing of `step_m` map units.
-  void Grid(const Orbit& orbit, double step_m) {
+  // Draws a horizontal grid through the target with a spacing of `step` map units.
+  void Grid(const Orbit& orbit, double step) {
     constexpr int kLines = 10;
     const engine::UprightAxes& axes = orbit.axes;
-    const double right = std::round(axes.right.dot(orbit.target) / step_m) * step_m;
-    const double ahead = std::round(axes.ahead.dot(orbit.target) / step_m) * step_m;
+    const double right = std::round(axes.right.dot(orbit.target) / step) * step;
+    const double ahead = std::round(axes.ahead.dot(orbit.target) / step) * step;
     const Eigen::Vector3d middle =
         right * axes.right + ahead * axes.ahead + axes.up.dot(orbit.target) * axes.up;
-    const double reach = kLines * step_m;
+    const double reach = kLines * step;
     for (int i = -kLines; i <= kLines; ++i) {
       const Color color{0.5f, 0.6f, 0.7f, i == 0 ? 0.4f : 0.18f};
-      const Eigen::Vector3d aside = middle + i * step_m * axes.right,
-                            along = middle + i * step_m * axes.ahead;
+      const Eigen::Vector3d aside = middle + i * step * axes.right, along = middle + i * step * axes.ahead;
       Line(aside - reach * axes.ahead, aside + reach * axes.ahead, color);
       Line(along - reach * axes.right, along + reach * axes.right, color);
     }
@@ -74,11 +73,11 @@ class Drawing {
     color.alpha = 0.75f;
     const Eigen::Vector3d side = orbit.axes.up.cross(found.direction);
     const double depth = std::max(1e-9, (camera_from_map_ * found.place).z());
-    const double width_px = 0.45 * found.side_m * kHalfEighth / kStrokes / (camera_.PixelAngle() * depth);
+    const double width_px = 0.45 * found.side * kHalfEighth / kStrokes / (camera_.PixelAngle() * depth);
     for (int i = 0; i < kStrokes; ++i) {
       const double turn = kHalfEighth * (2.0 * i / (kStrokes - 1) - 1);
       const Eigen::Vector3d outwards = std::cos(turn) * found.direction + std::sin(turn) * side;
-      Line(found.place + 0.06 * found.side_m * outwards, found.place + 0.45 * found.side_m * outwards, color,
+      Line(found.place + 0.06 * found.side * outwards, found.place + 0.45 * found.side * outwards, color,
            std::max(1.0, 1.2 * width_px));
     }
   }
@@ -106,7 +105,7 @@ class Drawing {
     Eigen::Vector3d forward = camera_from_map.rotation.inverse() * Eigen::Vector3d::UnitZ();
     forward -= orbit.axes.up.dot(forward) * orbit.axes.up;
     const auto ahead =
-        camera_.Project(camera_from_map_ * Eigen::Vector3d(place + 1e-3 * orbit.distance_m * forward));
+        camera_.Project(camera_from_map_ * Eigen::Vector3d(place + 1e-3 * orbit.distance * forward));
     const Eigen::Vector2d way = ahead ? Eigen::Vector2d(*ahead - *pixel) : Eigen::Vector2d(0, 0);
     if (way.norm() > 1e-9) {
       const Eigen::Vector2d along = size * way.normalized(), aside(-along.y(), along.x());
@@ -189,7 +188,7 @@ engine::Rigid3 CameraFromMap(const Orbit& orbit) {
   rotation.row(0) = right;
   rotation.row(1) = down;
   rotation.row(2) = forward;
-  const Eigen::Vector3d eye = orbit.target - orbit.distance_m * forward;
+  const Eigen::Vector3d eye = orbit.target - orbit.distance * forward;
   return {engine::Rotation3(rotation), -(rotation * eye)};
 }
 
@@ -230,7 +229,7 @@ Orbit OrbitAbove(const engine::MapSnapshot& map, double width_over_height) {
   orbit.target = axes_from_map.transpose() * box.center();
   const double radius = 0.5 * box.diagonal().norm();
   const double tangent = kHalfViewHeight * std::min(1.0, width_over_height);
-  orbit.distance_m = radius > 0 ? 1.1 * radius * std::hypot(1.0, 1.0 / tangent) : 1.0;
+  orbit.distance = radius > 0 ? 1.1 * radius * std::hypot(1.0, 1.0 / tangent) : 1.0;
   return orbit;
 }
 
@@ -256,7 +255,7 @@ void MapView::Draw(const engine::MapSnapshot& map, const Orbit& orbit, const Map
   const RenderTarget& target = impl_->image.Bind(width_px, height_px);
   impl_->image.DrawVideo(cv::Mat());
   const engine::Rigid3 camera_from_map = CameraFromMap(orbit);
-  const double grid = RoundLength(std::max(1e-6, 0.25 * orbit.distance_m * kHalfViewHeight));
+  const double grid = RoundLength(std::max(1e-6, 0.25 * orbit.distance * kHalfViewHeight));
 
   impl_->below.Begin(width_px, height_px);
   Drawing drawing(impl_->camera, camera_from_map, &impl_->below);

@@ -22,7 +22,7 @@ namespace docent::ui {
 struct Orbit {
   engine::UprightAxes axes;                          // The horizontal plane of the map.
   Eigen::Vector3d target = Eigen::Vector3d::Zero();  // Map coordinates.
-  double distance_m = 1.0;                           // In map units.
+  double distance = 1.0;                             // In map units.
   // Radians about the up axis, clockwise seen from above. At 0 the viewpoint lies on the side from which the
   // map's first camera looks.
   double azimuth = 0.0;
@@ -52,8 +52,8 @@ struct PredictedRecall {
   Eigen::Vector3d place = Eigen::Vector3d::Zero();  // Map coordinates.
   // Unit vector in the map, horizontal: the central direction of the octant.
   Eigen::Vector3d direction = Eigen::Vector3d::UnitZ();
-  double side_m = 1;  // Side of the grid cell that is centred on the place, in map units.
-  double share = 0;   // Ratio of successful attempts.
+  double side = 1;   // Side of the grid cell that is centred on the place, in map units.
+  double share = 0;  // Ratio of successful attempts.
 };
 Color RecallColor(double share);
 

@@ -252,12 +252,12 @@ void MeshDrawer::DepthRange::Include(double depth, double radius) {
   farthest = std::max(farthest, depth + radius);
 }
 
-double MeshDrawer::DepthRange::near_m() const {
-  return std::max(nearest * 0.99, far_m() / kMaxDepthRatio);
+double MeshDrawer::DepthRange::near_plane() const {
+  return std::max(nearest * 0.99, far_plane() / kMaxDepthRatio);
 }
 
 glm::mat4 MeshDrawer::DepthRange::ClipFromMap(const PinholeView& view) const {
-  return GlClipFromGlEye(view.bounds, near_m(), far_m()) * GlEyeFromMap(view.camera_from_map);
+  return GlClipFromGlEye(view.bounds, near_plane(), far_plane()) * GlEyeFromMap(view.camera_from_map);
 }
 
 void MeshDrawer::AddDepths(const PinholeView& view, DepthRange* range) const {

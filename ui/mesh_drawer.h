@@ -64,8 +64,8 @@ class MeshDrawer {
     bool empty() const { return farthest <= 0; }
     void Include(double depth, double radius);
     glm::mat4 ClipFromMap(const PinholeView& view) const;
-    double near_m() const;
-    double far_m() const { return 1.01 * farthest; }
+    double near_plane() const;
+    double far_plane() const { return 1.01 * farthest; }
   };
   // Adds those that may be visible.
   void AddDepths(const PinholeView& view, DepthRange* range) const;

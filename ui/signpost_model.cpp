@@ -299,8 +299,8 @@ engine::Sim3 SignpostArrowPose(const content::Signpost& signpost) {
   engine::Sim3 pose;
   pose.rotation = engine::Rotation3(axes);
   pose.translation =
-      content::BoardMiddle(signpost) + (0.5 + kArrowAboveBoard) * signpost.height_m * signpost.up;
-  pose.scale = signpost.height_m;
+      content::BoardMiddle(signpost) + (0.5 + kArrowAboveBoard) * signpost.height * signpost.up;
+  pose.scale = signpost.height;
   return pose;
 }
 
@@ -317,7 +317,7 @@ engine::Sim3 SignpostPose(const content::Signpost& signpost, const Eigen::Vector
   engine::Sim3 pose;
   pose.rotation = engine::Rotation3(rotation);
   pose.translation = signpost.anchor;
-  pose.scale = signpost.height_m;
+  pose.scale = signpost.height;
   return pose;
 }
 

@@ -17,7 +17,7 @@ void AdaptiveQuality::WarmUp(ui::Renderer* renderer) {
   sign.kind = content::Entity::Kind::kSignpost;
   sign.signpost.text = " ";
   sign.signpost.anchor = {0, 0.5, 2};
-  sign.signpost.height_m = 0.5;
+  sign.signpost.height = 0.5;
   sign.signpost.direction = Eigen::Vector3d::UnitX();
   ui::View view;
   view.tracked = &tracked;

@@ -95,7 +95,7 @@ content::Entity NewSignpost(const AddOptions& options, const Target& target, std
   entity.signpost.to_map = options.to_map;
   entity.signpost.to_key = to_key;
   if (options.direction) entity.signpost.direction = options.direction->stableNormalized();
-  entity.signpost.height_m = options.height.value_or(SessionOptions().signpost_height * target.distance);
+  entity.signpost.height = options.height.value_or(SessionOptions().signpost_height * target.distance);
   return entity;
 }
 

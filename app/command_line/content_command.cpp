@@ -45,7 +45,7 @@ Json ToJson(const maps::MapInfo& map, const content::Entity& entity, const std::
     json["translations"] = *content::TranslationsOf(entity);
     json["missing_languages"] = content::MissingLanguages(entity, languages);
   }
-  json["position_m"] = {place.x(), place.y(), place.z()};
+  json["position"] = {place.x(), place.y(), place.z()};
   if (content::HasModel(entity)) json["scale"] = entity.model.map_from_model.scale;
   if (entity.kind == Kind::kModel) json["bent"] = entity.model.warp != nullptr;
   if (entity.kind == Kind::kSignpost) {
@@ -54,12 +54,12 @@ Json ToJson(const maps::MapInfo& map, const content::Entity& entity, const std::
     if (const auto& direction = entity.signpost.direction)
       json["direction"] = {direction->x(), direction->y(), direction->z()};
   }
-  if (entity.kind == Kind::kSound) json["range_m"] = entity.sound.range;
+  if (entity.kind == Kind::kSound) json["range"] = entity.sound.range;
   if (entity.kind == Kind::kTrail) {
-    json["width_m"] = entity.trail.width;
-    json["points_m"] = Json::array();
+    json["width"] = entity.trail.width;
+    json["points"] = Json::array();
     for (const Eigen::Vector3d& point : entity.trail.points)
-      json["points_m"].push_back({point.x(), point.y(), point.z()});
+      json["points"].push_back({point.x(), point.y(), point.z()});
   }
   if (entity.kind == Kind::kOccluder) {
     const content::Occluder& occluder = entity.occluder;
@@ -81,7 +81,7 @@ std::string Summary(const Json& entry) {
   if (entry.contains("file"))
     summary = entry["file"].get<std::string>() + (summary.empty() ? "" : ": " + summary);
   if (entry.contains("shape")) summary = entry["shape"].get<std::string>();
-  if (entry.contains("points_m")) summary = std::to_string(entry["points_m"].size()) + " points";
+  if (entry.contains("points")) summary = std::to_string(entry["points"].size()) + " points";
   return summary;
 }
 

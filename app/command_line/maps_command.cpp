@@ -106,7 +106,7 @@ Json DescribeRelocalization(const engine::MapSnapshot& map, Verbosity verbosity)
   }
   if (trials.empty()) return json;
   const auto grid = maps::MakeRelocalizationGrid(map, trials);
-  json["square_m"] = grid.side;
+  json["square_side"] = grid.side;
   json["grid"] = Json::array();
   for (const maps::RelocalizationCell& cell : grid.cells) {
     json["grid"].push_back({{"right", cell.square.x()},
@@ -125,7 +125,7 @@ void PrintRelocalization(const Json& json) {
   if (!json.contains("grid")) return;
   std::printf("%-20s %s\n", "missed_keyframes", json["missed_keyframes"].dump().c_str());
   std::printf("%-20s squares of %.3g map units; right, ahead and direction relative to the first keyframe\n",
-              "", json["square_m"].get<double>());
+              "", json["square_side"].get<double>());
   for (const Json& cell : json["grid"]) {
     std::printf("%-20s right %3d  ahead %3d  %4d deg  %d of %d\n", "", cell["right"].get<int>(),
                 cell["ahead"].get<int>(), cell["direction_deg"].get<int>(), cell["found"].get<int>(),
@@ -133,7 +133,7 @@ void PrintRelocalization(const Json& json) {
   }
 }
 
-// Summary of a map. `camera_extent_m` is the size of the bounding box of the keyframe positions, in map
+// Summary of a map. `camera_extent` is the size of the bounding box of the keyframe positions, in map
 // units; `surface_triangles` is 0 for a map whose surfaces have not been computed.
 Json Describe(const maps::StoredMap& map, Verbosity verbosity) {
   Json json = ToJson(map.info);
@@ -148,7 +148,7 @@ Json Describe(const maps::StoredMap& map, Verbosity verbosity) {
   json["infinite_points"] = infinite;
   json["surface_triangles"] = map.mesh ? map.mesh->mesh.triangles.size() : 0;
   const Eigen::Vector3d size = cameras.isEmpty() ? Eigen::Vector3d::Zero() : Eigen::Vector3d(cameras.sizes());
-  json["camera_extent_m"] = {size.x(), size.y(), size.z()};
+  json["camera_extent"] = {size.x(), size.y(), size.z()};
   json["relocalization"] = DescribeRelocalization(*map.snapshot, verbosity);
   json["assets"] = Json::array();
   for (const maps::AssetRecord& asset : map.scene.assets) json["assets"].push_back(asset.name);

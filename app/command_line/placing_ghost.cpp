@@ -75,7 +75,7 @@ content::Entity GhostAt(const content::Entity& begun, const ui::AuthoringChoices
     case content::Entity::Kind::kSignpost:
       entity.signpost.anchor = hit.point;
       entity.signpost.up = up;
-      entity.signpost.height_m = SessionOptions().signpost_height * distance;
+      entity.signpost.height = SessionOptions().signpost_height * distance;
       return entity;
     case content::Entity::Kind::kLabel:
       return NewLabel(choices.label_text, hit.point, up, distance);

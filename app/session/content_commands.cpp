@@ -123,7 +123,7 @@ void ContentCommands::Apply(const PlaceSignpost& command, const engine::TrackedF
   entity.signpost.anchor = hit.point;
   entity.signpost.up = UpOf(*map.scene, *frame.map);
   // Map units mean nothing to the user, so the size is chosen by the distance from the camera.
-  entity.signpost.height_m = options_.signpost_height * (frame.camera_from_map * hit.point).norm();
+  entity.signpost.height = options_.signpost_height * (frame.camera_from_map * hit.point).norm();
   entity.signpost.to_map = command.to_map;
   entity.signpost.to_key = TargetKey(map, command.to_map);
   Edit(&map, content::AddEdit(*map.scene, std::move(entity)));

@@ -20,7 +20,7 @@ constexpr double kLegible_deg = 0.4;
 std::optional<std::pair<Eigen::Vector3d, double>> BoardOf(const content::Entity& entity) {
   // A signpost's board holds about three lines.
   if (entity.kind == content::Entity::Kind::kSignpost)
-    return std::pair(content::BoardMiddle(entity.signpost), entity.signpost.height_m / 3);
+    return std::pair(content::BoardMiddle(entity.signpost), entity.signpost.height / 3);
   if (entity.kind == content::Entity::Kind::kLabel)
     return std::pair(Eigen::Vector3d(entity.label.anchor + entity.label.offset), entity.label.text_height);
   return std::nullopt;

@@ -16,7 +16,7 @@ std::optional<Eigen::Vector3d> DirectionToMap(const content::Signpost& signpost,
   if (!begin) return std::nullopt;
   const Eigen::Vector3d way = a_from_b * *begin - content::BoardMiddle(signpost);
   // Nearer than the size of the board, the direction would depend on where the board hangs.
-  if (!(way.norm() > signpost.height_m)) return std::nullopt;
+  if (!(way.norm() > signpost.height)) return std::nullopt;
   return way.normalized();
 }
 

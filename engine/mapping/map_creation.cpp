@@ -12,7 +12,7 @@ void MapCreation::CreateFromPair(const InitialPair& pair) {
   panoramas_->Reset();
   loops_->Reset();
   lens_estimation_->Reset();
-  const double scale = pair.baseline_m > 0 ? pair.baseline_m : options_.initial_baseline_m;
+  const double scale = pair.baseline_m > 0 ? pair.baseline_m : options_.initial_baseline;
   const Views views = AddViews(pair, scale);
   AddMatchedPoints(pair, scale, views);
   AdjustGlobally(options_.adjustment, nullptr, &map);

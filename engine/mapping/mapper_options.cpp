@@ -8,7 +8,7 @@ namespace docent::engine {
 std::optional<std::string> MapperOptions::Validate() const {
   return OptionCheck()
       .That(max_queue > 0, "The queue of the mapper must hold at least one keyframe.")
-      .Positive(initial_baseline_m, "baseline of two initial views")
+      .Positive(initial_baseline, "baseline of two initial views")
       .AtLeast(partners, 0, "number of partners of a keyframe")
       .AtLeast(min_partner_baseline, 0, "smallest baseline of a partner")
       .That(max_partner_baseline > min_partner_baseline,

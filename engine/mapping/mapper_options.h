@@ -24,7 +24,7 @@ namespace docent::engine {
 
 struct MapperOptions {
   std::size_t max_queue = 3;           // keyframes that wait to be inserted (ptamm §2.2)
-  double initial_baseline_m = 0.1;     // distance of the two initial views if it is unknown, ptamm §2.3
+  double initial_baseline = 0.1;       // distance of the two initial views if it is unknown, ptamm §2.3
   int partners = 3;                    // keyframes in which the corners of a new keyframe are searched
   double min_partner_baseline = 0.03;  // ratio of the keyframe's median depth
   double max_partner_baseline = 0.6;   // ratio of the keyframe's median depth

@@ -182,7 +182,7 @@ TEST(Edits, MoveRotateAndScaleChangeThePoseAsDocumented) {
   const Eigen::Vector3d up = pose.rotation * Eigen::Vector3d::UnitY();
   EXPECT_LT((up - Eigen::Vector3d::UnitZ()).norm(), 1e-12) << "the up axis must not change";
   apply(ScaleEdit(scene, "sign-1", 2));
-  EXPECT_DOUBLE_EQ(scene.entities[1].signpost.height_m, 0.2);
+  EXPECT_DOUBLE_EQ(scene.entities[1].signpost.height, 0.2);
   const engine::Sim3 wanted{engine::Rotation3::Exp({0.1, 0.2, 0.3}), {-1, 0, 1}, 0.4};
   apply(TransformEdit(scene, "helmet", wanted));
   EXPECT_EQ(pose.translation, wanted.translation);
@@ -190,7 +190,7 @@ TEST(Edits, MoveRotateAndScaleChangeThePoseAsDocumented) {
   EXPECT_LT((pose.rotation.inverse() * wanted.rotation).Angle(), 1e-12);
   apply(TransformEdit(scene, "sign-1", wanted));
   EXPECT_EQ(scene.entities[1].signpost.anchor, wanted.translation);
-  EXPECT_EQ(scene.entities[1].signpost.height_m, 0.4);
+  EXPECT_EQ(scene.entities[1].signpost.height, 0.4);
   EXPECT_EQ(scene.entities[1].signpost.up, SignEntity("").signpost.up);
 }
 

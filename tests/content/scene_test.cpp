@@ -39,7 +39,7 @@ Scene TestScene() {
   sign.signpost.text = "Zum Café →\nzweite Zeile";
   sign.signpost.anchor = {0.1, 0.2, 0.3};
   sign.signpost.up = Eigen::Vector3d(1, 2, 3).normalized();
-  sign.signpost.height_m = 0.07;
+  sign.signpost.height = 0.07;
   sign.signpost.to_map = "Desk 3";
   sign.signpost.to_key = 18'000'000'000'000'000'000u;
   sign.locked = sign.hidden = true;
@@ -85,7 +85,7 @@ TEST(SceneCodec, DecodingReproducesTheNumbersExactly) {
   EXPECT_EQ(sign.text, scene.entities[1].signpost.text);
   EXPECT_EQ(sign.anchor, scene.entities[1].signpost.anchor);
   EXPECT_EQ(sign.up, scene.entities[1].signpost.up);
-  EXPECT_EQ(sign.height_m, 0.07);
+  EXPECT_EQ(sign.height, 0.07);
   EXPECT_EQ(sign.to_map, "Desk 3");
   EXPECT_EQ(sign.to_key, scene.entities[1].signpost.to_key);
   EXPECT_TRUE(read.entities[1].locked && read.entities[1].hidden);
@@ -206,7 +206,7 @@ Entity AnyEntity(Random* random) {
     entity.signpost.anchor = vector(100);
     entity.signpost.up = vector(1);
     if (random->Uniform(0, 1) < 0.98) entity.signpost.up.normalize();
-    entity.signpost.height_m = AnyNumber(random, 10);
+    entity.signpost.height = AnyNumber(random, 10);
     entity.signpost.to_map = AnyText(random);
     entity.signpost.to_key = static_cast<std::uint64_t>(random->Uniform(0, 1e18));
     if (random->Uniform(0, 1) < 0.3) entity.signpost.translations["de-at"] = AnyText(random);
@@ -246,7 +246,7 @@ TEST(SceneCodec, EveryRandomSceneIsRefusedByTheWriterOrReadBackEqual) {
       EXPECT_EQ(a.signpost.to_map, b.signpost.to_map);
       EXPECT_EQ(PlaceOf(a), PlaceOf(b));
       EXPECT_EQ(a.model.map_from_model.scale, b.model.map_from_model.scale);
-      EXPECT_EQ(a.signpost.height_m, b.signpost.height_m);
+      EXPECT_EQ(a.signpost.height, b.signpost.height);
       EXPECT_EQ(a.signpost.to_key, b.signpost.to_key);
       EXPECT_EQ(a.signpost.direction, b.signpost.direction);
       EXPECT_EQ(a.locked, b.locked);

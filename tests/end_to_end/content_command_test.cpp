@@ -206,7 +206,7 @@ TEST(ContentCommand, AddsModelsAndSignpostsToASavedMap) {
   const Outcome list = RunDocent({"content", "list", "--library", path, "--json"});
   const auto content = nlohmann::json::parse(list.output).at("content");
   ASSERT_EQ(content.size(), 5u);
-  EXPECT_EQ(content[0]["position_m"], nlohmann::json({1.0, -2.0, 3.5}));
+  EXPECT_EQ(content[0]["position"], nlohmann::json({1.0, -2.0, 3.5}));
   EXPECT_EQ(content[0]["scale"], 0.25);
   EXPECT_EQ(content[0]["file"], "exhibit.glb");
   EXPECT_EQ(content[3]["to_map"], "Kiosk");
@@ -227,7 +227,7 @@ TEST(ContentCommand, AddsModelsAndSignpostsToASavedMap) {
     EXPECT_LT((upright.rotation * Eigen::Vector3d::UnitZ() + Eigen::Vector3d::UnitX()).norm(), 1e-9);
     const engine::Sim3& free = scene.entities[1].model.map_from_model;
     EXPECT_LT((free.rotation * Eigen::Vector3d::UnitZ() + Eigen::Vector3d::UnitZ()).norm(), 1e-9);
-    EXPECT_EQ(scene.entities[3].signpost.height_m, 0.5);
+    EXPECT_EQ(scene.entities[3].signpost.height, 0.5);
   }
 
   const auto list_content = [&] { return RunDocent({"content", "list", "--library", path}).output; };

@@ -184,7 +184,7 @@ def main():
     for entry in json.loads(listing)["content"]:
         if entry["map"] in world_from_map:
             scale, r, t = world_from_map[entry["map"]]
-            turned = apply(r, entry["position_m"])
+            turned = apply(r, entry["position"])
             anchors[entry["map"], entry["name"]] = [scale * turned[i] + t[i] for i in range(3)]
 
     errors = collections.defaultdict(list)

@@ -185,7 +185,7 @@ TEST(EntityShapes, HaveTheBaseOfTheBoxWhereTheEntityStands) {
   sign.kind = content::Entity::Kind::kSignpost;
   sign.signpost.text = "Elephants";
   sign.signpost.anchor = {1, 2, 3};
-  sign.signpost.height_m = 0.5;
+  sign.signpost.height = 0.5;
   EntityShapes shapes;
   const auto box = shapes.BoxOf(sign, {0, 0, 0});
   ASSERT_TRUE(box);
@@ -199,7 +199,7 @@ TEST(EntityShapes, HaveTheBaseOfTheBoxWhereTheEntityStands) {
   pose.scale = 2;
   content::SetPose(pose, &sign);
   EXPECT_EQ(sign.signpost.anchor, Eigen::Vector3d(4, 5, 6));
-  EXPECT_EQ(sign.signpost.height_m, 2);
+  EXPECT_EQ(sign.signpost.height, 2);
 }
 
 }  // namespace

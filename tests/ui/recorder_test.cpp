@@ -64,7 +64,7 @@ TEST(Recorder, LeavesNoFileWhenNoImageWasWritten) {
 TEST(MapView, ViewsStraightDownAtMaximumElevation) {
   Orbit orbit;
   orbit.target = {1, 2, 3};
-  orbit.distance_m = 4;
+  orbit.distance = 4;
   orbit.elevation = 10;  // Clamped to a right angle.
   const engine::Rigid3 camera_from_map = CameraFromMap(orbit);
   EXPECT_LT((camera_from_map.OriginInSource() - Eigen::Vector3d(1, -2, 3)).norm(), 1e-9);
@@ -101,7 +101,7 @@ using MapViewImage = OffscreenTest;
 TEST_F(MapViewImage, ShowsPredictedRecallByPlaceAndDirection) {
   const engine::MapSnapshot map;
   Orbit orbit;
-  orbit.distance_m = 4;
+  orbit.distance = 4;
   orbit.elevation = std::numbers::pi / 2;
   MapView view;
   cv::Mat image;
@@ -122,7 +122,7 @@ TEST_F(MapViewImage, ShowsPredictedRecallByPlaceAndDirection) {
 
 TEST_F(MapViewImage, ShowsTheEdgesOfTheBoundary) {
   Orbit orbit;
-  orbit.distance_m = 4;
+  orbit.distance = 4;
   orbit.elevation = std::numbers::pi / 2;
   MapView view;
   MapViewContents contents;

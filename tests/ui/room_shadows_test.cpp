@@ -215,7 +215,7 @@ TEST_F(RoomShadowsTest, AreDrawnAgainOnlyForWhatMoves) {
   sign.name = "sign-1";
   sign.signpost.text = "A";
   sign.signpost.anchor = {1.2, 1, 4};
-  sign.signpost.height_m = 0.3;
+  sign.signpost.height = 0.3;
   others_ = {sign};
   Draw(Floor(1));
   const unsigned with_both = triangles_;

@@ -24,7 +24,7 @@ TEST(Signpost, FacesTheReaderAboutItsUpAxisFromEverySide) {
   content::Signpost sign = Sign("Elephants");
   sign.anchor = {0.4, 0.2, 1.5};
   sign.up = Eigen::Vector3d(0.1, -1, 0.2).normalized();
-  sign.height_m = 0.3;
+  sign.height = 0.3;
   Random random(11);
   for (int i = 0; i < 200; ++i) {
     const Eigen::Vector3d eye(random.Uniform(-3, 3), random.Uniform(-3, 3), random.Uniform(-3, 3));
@@ -97,18 +97,18 @@ struct SignInView {
     };
     sign.anchor = 5 * vector();
     sign.up = (Eigen::Vector3d(0, -1, 0) + 0.2 * vector()).normalized();
-    sign.height_m = random->Uniform(0.1, 1);
+    sign.height = random->Uniform(0.1, 1);
     sign.direction = vector().normalized();
     camera_from_map.rotation = engine::Rotation3::Exp(vector());
     const Eigen::Vector3d middle = SignpostArrowPose(sign).translation;
     const Eigen::Vector3d seen_at(random->Uniform(-0.4, 0.4), random->Uniform(-0.3, 0.3), 1);
     camera_from_map.translation =
-        random->Uniform(3, 6) * sign.height_m * seen_at - camera_from_map.rotation * middle;
+        random->Uniform(3, 6) * sign.height * seen_at - camera_from_map.rotation * middle;
   }
   // How the arrow must be seen: from its middle to a point a little further in the direction, in pixels.
   Eigen::Vector2d TrueDirection(const engine::CameraModel& camera) const {
     const Eigen::Vector3d middle = camera_from_map * SignpostArrowPose(sign).translation;
-    const Eigen::Vector3d step = camera_from_map.rotation * (1e-3 * sign.height_m * *sign.direction);
+    const Eigen::Vector3d step = camera_from_map.rotation * (1e-3 * sign.height * *sign.direction);
     return (*camera.Project(middle + step) - *camera.Project(middle)) / 1e-3;
   }
 };
@@ -155,7 +155,7 @@ TEST(SignpostArrow, HasAValidPoseInEveryDirectionAlsoStraightUp) {
 
 TEST(SignpostArrow, StandsAboveTheBoardAndTouchesItNowhere) {
   content::Signpost sign = Sign("Roof");
-  sign.height_m = 0.5;
+  sign.height = 0.5;
   for (const double angle : {0.0, 0.5, 1.5, 3.1}) {
     sign.direction = Eigen::Vector3d(0, std::cos(angle), std::sin(angle));
     const engine::Sim3 pose = SignpostArrowPose(sign);
@@ -163,7 +163,7 @@ TEST(SignpostArrow, StandsAboveTheBoardAndTouchesItNowhere) {
       for (const content::Vertex& vertex : part.vertices) {
         const Eigen::Vector3d point =
             pose * Eigen::Vector3d(vertex.position.x, vertex.position.y, vertex.position.z);
-        EXPECT_GT((point - sign.anchor).dot(sign.up), 1.7 * sign.height_m);
+        EXPECT_GT((point - sign.anchor).dot(sign.up), 1.7 * sign.height);
       }
     }
   }
@@ -211,7 +211,7 @@ TEST_F(SignpostImage, ShowsItsBoardToReadersOnBothSides) {
   content::Entity entity;
   entity.signpost = Sign("Elephants");
   entity.signpost.anchor = {0, 0.3, 2};
-  entity.signpost.height_m = 0.4;
+  entity.signpost.height = 0.4;
   scene.entities.push_back(entity);
   engine::TrackedFrame tracked = Tracked(cv::Mat::zeros(480, 640, CV_8UC3));
   const cv::Mat front = DrawImage(&renderer, tracked, camera, scene);
@@ -283,7 +283,7 @@ TEST_F(SignpostImage, ShowsNoArrowWithoutADirection) {
   content::Signpost& sign = scene.entities.emplace_back().signpost;
   sign = Sign("Elephants");
   sign.anchor = {0, 0.3, 2};
-  sign.height_m = 0.4;
+  sign.height = 0.4;
   const engine::TrackedFrame tracked = Tracked(cv::Mat::zeros(480, 640, CV_8UC3));
   EXPECT_FALSE(HeadIn(DrawImage(&renderer, tracked, camera, scene)));
   sign.direction = Eigen::Vector3d(1, 0, 0);

@@ -216,7 +216,7 @@ TEST_F(WayOnOfVisitors, HasItsTextWhereItDoesNotCoverTheSignpost) {
   sign.kind = content::Entity::Kind::kSignpost;
   sign.signpost.text = "To the clocks";
   sign.signpost.anchor = {0.95, 0.4, 2};
-  sign.signpost.height_m = 0.3;
+  sign.signpost.height = 0.3;
   const std::vector<Eigen::AlignedBox2d> boards = SignBoards(scene, kViewsCamera, tracked.camera_from_map);
   ASSERT_EQ(boards.size(), 1u);
   View view;

@@ -183,11 +183,11 @@ TEST_F(ContentInASession, EveryCommandChangesTheContentAndIsUndone) {
     const std::vector<std::pair<Command, std::function<void()>>> commands = {
         {TransformEntities{{{"exhibit", pose}}},
          [&] { EXPECT_EQ(Named("exhibit").model.map_from_model.translation, pose.translation); }},
-        {TransformEntities{{{"sign-1", pose}}}, [&] { EXPECT_EQ(Named("sign-1").signpost.height_m, 0.5); }},
+        {TransformEntities{{{"sign-1", pose}}}, [&] { EXPECT_EQ(Named("sign-1").signpost.height, 0.5); }},
         {TransformEntities{{{"exhibit", pose}, {"sign-1", pose}}},
          [&] {
            EXPECT_EQ(Named("exhibit").model.map_from_model.scale, 0.5);
-           EXPECT_EQ(Named("sign-1").signpost.height_m, 0.5);
+           EXPECT_EQ(Named("sign-1").signpost.height, 0.5);
          }},
         {RemoveEntities{{"exhibit", "sign-1"}}, [&] { EXPECT_THAT(Scene().entities, IsEmpty()); }},
         {DuplicateEntities{{"exhibit", "sign-1"}},
@@ -345,7 +345,7 @@ void AddHall(maps::Library* library, const engine::MapSnapshot& like) {
   sign.name = "sign-1";
   sign.signpost.text = "to the bay";
   sign.signpost.anchor = {1, 2, 3};
-  sign.signpost.height_m = 0.5;
+  sign.signpost.height = 0.5;
   sign.signpost.to_map = "Bay";
   scene.entities.push_back(sign);
   maps::MapRecord record;
@@ -455,11 +455,11 @@ TEST_F(ContentInASession, ContentIsPastedFromAnotherMapAndSignpostsLeadToOtherMa
               ASSERT_EQ(Do(PasteEntities{{"sign-1"}, there, kPixel}), "");
               double there_height = 0;
               for (const Session::MapState& map : session_->Maps()) {
-                if (map.name == there) there_height = map.scene->entities.at(0).signpost.height_m;
+                if (map.name == there) there_height = map.scene->entities.at(0).signpost.height;
               }
               EXPECT_GT(there_height, 0) << "the map was loaded";
               const content::Signpost& pasted = Named("sign-2").signpost;
-              EXPECT_NEAR(pasted.height_m, ratio * there_height, 1e-12);
+              EXPECT_NEAR(pasted.height, ratio * there_height, 1e-12);
               EXPECT_LT((pasted.up - engine::UpInMap(*frame_.map)).norm(), 0.2);
               const auto seen = LensOf(*simulation)[0]->Project(frame_.camera_from_map * pasted.anchor);
               EXPECT_LT((*seen - kPixel).norm(), 0.01);

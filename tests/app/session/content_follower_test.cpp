@@ -53,7 +53,7 @@ content::Scene TwoThings() {
   model.model.map_from_model = {engine::Rotation3(), {0.2, 0.1, 2.8}, 0.3};
   sign.name = "sign-1";
   sign.signpost.anchor = {-0.3, 0.2, 3.1};
-  sign.signpost.height_m = 0.2;
+  sign.signpost.height = 0.2;
   scene.entities = {model, sign};
   return scene;
 }
@@ -76,7 +76,7 @@ TEST(ContentFollower, MovesContentWithItsAnchor) {
   EXPECT_LT((model.rotation * wanted.rotation.inverse()).Angle(), 1e-9);
   const content::Signpost& sign = map.scene->Find("sign-1")->signpost;
   EXPECT_LT((sign.anchor - Bend() * before.Find("sign-1")->signpost.anchor).norm(), 1e-9);
-  EXPECT_NEAR(sign.height_m, 0.95 * 0.2, 1e-9);
+  EXPECT_NEAR(sign.height, 0.95 * 0.2, 1e-9);
 }
 
 TEST(ContentFollower, KeepsTheSceneWhileNothingMoves) {

@@ -15,7 +15,7 @@ content::Entity Sign(const std::string& name, const std::string& to_map, const E
   sign.name = name;
   sign.signpost.text = "this way";
   sign.signpost.anchor = anchor;
-  sign.signpost.height_m = 0.2;
+  sign.signpost.height = 0.2;
   sign.signpost.to_map = to_map;
   return sign;
 }
@@ -59,7 +59,7 @@ TEST(JoinedScenes, HoldTheContentOfBothMapsInTheCoordinatesOfTheFirst) {
   EXPECT_EQ(both.Find("sign-1")->signpost.anchor, a.entities[0].signpost.anchor);
   const content::Signpost& moved = both.Find("sign-1-2")->signpost;
   EXPECT_LT((moved.anchor - a_from_b * Eigen::Vector3d(1, 2, 3)).norm(), 1e-9);
-  EXPECT_NEAR(moved.height_m, 0.5, 1e-9);
+  EXPECT_NEAR(moved.height, 0.5, 1e-9);
   EXPECT_LT((moved.up - a_from_b.rotation * b.entities[0].signpost.up).norm(), 1e-9);
   EXPECT_EQ(moved.to_map, "Garden");
   EXPECT_LT((moved.direction.value() - a_from_b.rotation * Eigen::Vector3d(0, 0.6, 0.8)).norm(), 1e-9);

@@ -34,7 +34,7 @@ TEST(DirectionToMap, LeadsFromTheBoardToTheFirstPositionOfTheOtherMap) {
     content::Signpost sign;
     sign.anchor = vector();
     sign.up = vector().normalized();
-    sign.height_m = 0.1;
+    sign.height = 0.1;
     const engine::Sim3 a_from_b{engine::Rotation3::Exp(vector()), vector(), random.Uniform(0.2, 5)};
     const Eigen::Vector3d begin_in_a = vector();
     const auto direction = DirectionToMap(sign, a_from_b, MapFrom(a_from_b.inverse() * begin_in_a));
@@ -48,7 +48,7 @@ TEST(DirectionToMap, LeadsFromTheBoardToTheFirstPositionOfTheOtherMap) {
 
 TEST(DirectionToMap, IsNotKnownWithoutABeginningElsewhere) {
   content::Signpost sign;
-  sign.height_m = 0.1;
+  sign.height = 0.1;
   EXPECT_FALSE(DirectionToMap(sign, {}, engine::MapSnapshot()));
   EXPECT_FALSE(DirectionToMap(sign, {}, MapFrom(content::BoardMiddle(sign) + Eigen::Vector3d(0.05, 0, 0))));
   EXPECT_TRUE(DirectionToMap(sign, {}, MapFrom(content::BoardMiddle(sign) + Eigen::Vector3d(0.15, 0, 0))));
