@@ -39,7 +39,7 @@ void CameraTally::Add(const engine::TrackedFrame& frame) {
   tracking_times_.Add(frame.tracking_time);
 }
 
-std::string FormatCameraReport(const std::vector<CameraTally>& cameras, double keyframe_held_s) {
+std::string FormatCameraReport(const std::vector<CameraTally>& cameras, double keyframe_queue_latency_s) {
   Json list = Json::array();
   for (const CameraTally& camera : cameras) {
     Json latencies;
@@ -55,14 +55,14 @@ std::string FormatCameraReport(const std::vector<CameraTally>& cameras, double k
                     {"drawn_interval_ms", Percentiles(camera.shown_intervals_)},
                     {"delivery", camera.delivery_ ? ToJson(*camera.delivery_) : Json(nullptr)}});
   }
-  const Json json = {{"cameras", list}, {"keyframe_held_ms", 1e3 * keyframe_held_s}};
+  const Json json = {{"cameras", list}, {"keyframe_queue_latency_ms", 1e3 * keyframe_queue_latency_s}};
   return json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
 }
 
 void WriteCameraReport(const std::filesystem::path& path, const std::vector<CameraTally>& cameras,
-                       double keyframe_held_s) {
+                       double keyframe_queue_latency_s) {
   CheckedFile file(path);
-  file.Write(FormatCameraReport(cameras, keyframe_held_s));
+  file.Write(FormatCameraReport(cameras, keyframe_queue_latency_s));
   file.Close();
 }
 

@@ -39,7 +39,8 @@ class CameraTally {
   void SetDelivery(const Delivery& delivery) { delivery_ = delivery; }
 
  private:
-  friend std::string FormatCameraReport(const std::vector<CameraTally>& cameras, double keyframe_held_s);
+  friend std::string FormatCameraReport(const std::vector<CameraTally>& cameras,
+                                        double keyframe_queue_latency_s);
 
   std::string name_;
   int frames_ = 0, with_pose_ = 0, by_odometry_ = 0, dropped_ = 0;
@@ -50,11 +51,11 @@ class CameraTally {
 };
 
 // JSON: {"cameras": [{name, frames, with_pose, by_odometry, dropped, tracking_ms {median, p95, max},
-// latency_ms {tracked, taken, drawn, shown}, drawn_interval_ms, delivery}], keyframe_held_ms}; unknown values
-// are null. keyframe_held_s: the longest time that a keyframe waited for the mapper.
-std::string FormatCameraReport(const std::vector<CameraTally>& cameras, double keyframe_held_s);
+// latency_ms {tracked, taken, drawn, shown}, drawn_interval_ms, delivery}], keyframe_queue_latency_ms};
+// unknown values are null. keyframe_queue_latency_s: the longest time that a keyframe waited for the mapper.
+std::string FormatCameraReport(const std::vector<CameraTally>& cameras, double keyframe_queue_latency_s);
 // Throws Error.
 void WriteCameraReport(const std::filesystem::path& path, const std::vector<CameraTally>& cameras,
-                       double keyframe_held_s);
+                       double keyframe_queue_latency_s);
 
 }  // namespace docent::app

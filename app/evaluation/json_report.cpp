@@ -75,7 +75,7 @@ Json ToJson(const SequenceReport& report) {
         {"loop_closing", report.mapping.loop_closing_s},
         {"other", report.mapping.other_s}}},
       {"loops_closed", report.mapping.loops_closed},
-      {"keyframe_held_ms", 1e3 * report.mapping.max_queue_latency_s},
+      {"keyframe_queue_latency_ms", 1e3 * report.mapping.max_queue_latency_s},
       {"wall_s", report.wall_s},
       {"peak_memory_mb", report.peak_memory_mb},
       {"discarded_frames", report.discarded_frames},

@@ -36,7 +36,7 @@ TEST(CameraReport, ReportsTheLatenciesOfEachCamera) {
   const auto json = nlohmann::json::parse(FormatCameraReport({hand, shoulder}, 0.03));
   const auto& cameras = json["cameras"];
   ASSERT_EQ(cameras.size(), 2u);
-  EXPECT_NEAR(json["keyframe_held_ms"].get<double>(), 30, 1e-9);
+  EXPECT_NEAR(json["keyframe_queue_latency_ms"].get<double>(), 30, 1e-9);
   EXPECT_EQ(cameras[0]["name"], "hand");
   EXPECT_EQ(cameras[0]["frames"], 102);
   EXPECT_EQ(cameras[0]["with_pose"], 100);
