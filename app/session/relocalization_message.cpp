@@ -43,6 +43,30 @@ std::string TextOf(const RejectionMessage& rejection, const VisitorStrings& stri
   return {};
 }
 
+std::string ReasonOf(const RejectionMessage& rejection, int inliers) {
+  const std::string& map = rejection.map;
+  const std::string count = " (" + std::to_string(inliers) + " inliers)";
+  switch (rejection.reason) {
+    case engine::RejectionReason::kNone:
+      break;
+    case engine::RejectionReason::kFewPoints:
+      return "too few inliers (" + std::to_string(inliers) + ")";
+    case engine::RejectionReason::kPoorFit:
+      return "large residual: " + map + count;
+    case engine::RejectionReason::kContradicted:
+      return "most of the image differs: " + map + count;
+    case engine::RejectionReason::kClustered:
+      return "inliers in one part of the image only: " + map + count;
+    case engine::RejectionReason::kAmbiguous:
+      return "ambiguous: " +
+             (rejection.competitor.empty() ? "two places in " + map : map + " or " + rejection.competitor) +
+             count;
+    case engine::RejectionReason::kUnconfirmed:
+      return "not confirmed yet: " + map + count;
+  }
+  return {};
+}
+
 bool RelocalizationMessage::Update(Timestamp time, bool has_pose, const engine::RelocalizationResult& result,
                                    const NameOf& name) {
   if (has_pose) {

@@ -19,8 +19,11 @@ struct RejectionMessage {
   std::string competitor;  // A map that it resembles as much; empty if that is another place in the same map.
 };
 
-// What a user is told of it, as a sentence; empty if there is no reason.
+// The sentence about it that a user reads; empty if there is no reason.
 std::string TextOf(const RejectionMessage& rejection, const VisitorStrings& strings);
+
+// The same for events.csv, in the engine's terms: "ambiguous: Elephants or Whales (31 inliers)".
+std::string ReasonOf(const RejectionMessage& rejection, int inliers);
 
 // The message for a user while a camera is lost and no hypothesis is accepted. The rejection reason changes
 // with every image; a message stays for at least a second, so that it can be read and events.csv does not

@@ -75,11 +75,10 @@ void SystemEventHandler::ReportRejection(const engine::TrackedFrame& frame) {
   const auto name = [this](std::uint64_t key) { return state_.NameOf(key); };
   const bool is_new = camera.relocalization_message.Update(frame.frame.time, engine::HasPose(frame.state),
                                                            frame.relocalization, name);
-  const std::string& text = camera.relocalization_message.text();
-  if (text.empty() || !is_new) return;
-  state_.AddEvent(frame.frame.time, "not sure",
-                  state_.CameraPrefix(CameraOf(frame)) + text + " (" +
-                      std::to_string(frame.relocalization.inliers) + " inliers)");
+  if (!is_new) return;
+  state_.AddEvent(frame.frame.time, "rejected",
+                  state_.CameraPrefix(CameraOf(frame)) +
+                      ReasonOf(camera.relocalization_message.rejection(), frame.relocalization.inliers));
 }
 
 void SystemEventHandler::Handle(const engine::SystemEvent& event, const engine::MapEntered&) {

@@ -54,6 +54,14 @@ TEST(RelocalizationMessage, DoesNotNameTheMapWhenThereAreFewInliers) {
   EXPECT_THAT(message.text(), HasSubstr("don't recognize"));
 }
 
+TEST(RelocalizationMessage, NamesTheReasonInTheEnginesTermsForTheLog) {
+  EXPECT_EQ(ReasonOf({RejectionReason::kFewPoints, "", ""}, 12), "too few inliers (12)");
+  EXPECT_EQ(ReasonOf({RejectionReason::kAmbiguous, "Elephants", "Whales"}, 31),
+            "ambiguous: Elephants or Whales (31 inliers)");
+  EXPECT_EQ(ReasonOf({RejectionReason::kUnconfirmed, "Whales", ""}, 40),
+            "not confirmed yet: Whales (40 inliers)");
+}
+
 TEST(RelocalizationMessage, IsClearedByAPoseAndWhenNothingResemblesTheImage) {
   const RelocalizationResult alike{
       .rejection = RejectionReason::kAmbiguous, .map_key = 1, .competitor_key = 2};

@@ -213,7 +213,7 @@ TEST_F(AuthoredBay, GivesAVisitorElsewhereTheRejectionReasonWithFewEvents) {
   const Seen seen = Feed(other, Pace::kLockstep, &session);
   EXPECT_EQ(seen.poses, 0);
   int reported = 0;
-  for (const Event& event : session.TakeEvents()) reported += event.event == "not sure";
+  for (const Event& event : session.TakeEvents()) reported += event.event == "rejected";
   EXPECT_GE(reported, 1);
   EXPECT_LE(reported, 3);
   EXPECT_THAT(session.ShownWith(seen.frames.back()).hint,
