@@ -34,7 +34,15 @@ std::string NameProblem(const std::string& name, const char* what) {
 
 std::string PixelProblem(const Eigen::Vector2d& pixel) {
   const bool near = IsAtMost(pixel.x(), kMaxPixel) && IsAtMost(pixel.y(), kMaxPixel);
-  return near ? "" : "the pixel is far outside any image";
+  if (near) return "";
+  return "the pixel must have coordinates between " + FormatNumber(-kMaxPixel) + " and " +
+         FormatNumber(kMaxPixel);
+}
+
+// Of `what`, a vector in the map.
+std::string CoordinatesProblem(const char* what, double most = content::kMaxCoordinate) {
+  return std::string(what) + " must have coordinates between " + FormatNumber(-most) + " and " +
+         FormatNumber(most) + " map units";
 }
 
 std::string AngleProblem(double angle_deg) {
@@ -70,7 +78,7 @@ std::string NamesProblem(const std::vector<std::string>& names) {
 // checked where it is known that the entity is one.
 std::string PoseProblem(const engine::Sim3& pose) {
   if (!IsAtMost(pose.translation.cwiseAbs().maxCoeff<Eigen::PropagateNaN>(), content::kMaxCoordinate))
-    return "the place is out of any map";
+    return CoordinatesProblem("the place");
   if (!IsAtMost(pose.rotation.quaternion().norm() - 1, 1e-4)) return "the rotation is not valid";
   return ScaleProblem(pose.scale);
 }
@@ -80,11 +88,12 @@ std::string PairsProblem(const std::vector<PointPair>& pairs) {
     return "expected at most " + std::to_string(content::kMaxWarpPoints) + " points";
   for (const PointPair& pair : pairs) {
     if (!IsAtMost(pair.in_model.cwiseAbs().maxCoeff<Eigen::PropagateNaN>(), kMaxModelCoordinate))
-      return "a point is far outside any model";
+      return "a point of the model must lie within " + FormatNumber(kMaxModelCoordinate) +
+             " metres of its origin";
     if (pair.pixel) {
       if (const std::string problem = PixelProblem(*pair.pixel); !problem.empty()) return problem;
     } else if (!IsAtMost(pair.in_map.cwiseAbs().maxCoeff<Eigen::PropagateNaN>(), content::kMaxCoordinate)) {
-      return "a place is out of any map";
+      return CoordinatesProblem("a place");
     }
   }
   return "";
@@ -92,14 +101,14 @@ std::string PairsProblem(const std::vector<PointPair>& pairs) {
 
 std::string OffsetProblem(const Eigen::Vector3d& offset) {
   const bool near = IsAtMost(offset.cwiseAbs().maxCoeff<Eigen::PropagateNaN>(), content::kMaxCoordinate);
-  return near ? "" : "the offset leads out of any map";
+  return near ? "" : CoordinatesProblem("the offset");
 }
 
 std::string DirectionProblem(const Eigen::Vector3d& direction) {
   // Of a shorter one, little more than rounding may be left.
   constexpr double kMinLength = 1e-6;
   if (!IsAtMost(direction.cwiseAbs().maxCoeff<Eigen::PropagateNaN>(), content::kMaxCoordinate))
-    return "the direction leads out of any map";
+    return CoordinatesProblem("the direction");
   return direction.norm() >= kMinLength ? "" : "the direction is too short; give X Y Z that are not all 0";
 }
 
@@ -113,7 +122,7 @@ std::string PointProblem(const MapPoint& point) {
   if (point.pixel) return PixelProblem(*point.pixel);
   const bool near =
       IsAtMost(point.in_map.cwiseAbs().maxCoeff<Eigen::PropagateNaN>(), content::kMaxCoordinate);
-  return near ? "" : "a place is out of any map";
+  return near ? "" : CoordinatesProblem("a place");
 }
 
 std::string First(std::initializer_list<std::string> problems) {
@@ -206,7 +215,9 @@ struct Validator {
   std::string operator()(const ResizeOccluder& c) const {
     const bool is_valid = c.size.minCoeff<Eigen::PropagateNaN>() >= 0 &&
                           c.size.maxCoeff<Eigen::PropagateNaN>() <= content::kMaxOccluderSide;
-    return First({NameProblem(c.name, "a name"), is_valid ? "" : "the sides are out of range"});
+    return First(
+        {NameProblem(c.name, "a name"),
+         is_valid ? "" : "the sides must be between 0 and " + FormatNumber(content::kMaxOccluderSide)});
   }
   std::string operator()(const SetLabelOffset& c) const {
     return First({NameProblem(c.name, "a name"), OffsetProblem(c.offset)});
@@ -215,7 +226,8 @@ struct Validator {
     if (c.to_pixel) return First({NameProblem(c.name, "a name"), PixelProblem(*c.to_pixel)});
     const bool near =
         IsAtMost(c.by_in_map.cwiseAbs().maxCoeff<Eigen::PropagateNaN>(), 2 * content::kMaxCoordinate);
-    return First({NameProblem(c.name, "a name"), near ? "" : "the offset leads out of any map"});
+    return First({NameProblem(c.name, "a name"),
+                  near ? "" : CoordinatesProblem("the offset", 2 * content::kMaxCoordinate)});
   }
   std::string operator()(const RotateEntity& c) const {
     return First({NameProblem(c.name, "a name"), AngleProblem(c.angle_deg)});
