@@ -36,12 +36,13 @@ DeviceStream::DeviceStream(const std::string& path, const DeviceFormat& wanted, 
   }
 }
 
-void DeviceStream::Fail(const std::string& what, int error) const {
+void DeviceStream::Fail(const std::string& what, int error, const std::string& advice) const {
   if (error == ENODEV || error == ENXIO) {
     throw DeviceGone("The camera " + path_ + " was unplugged or stopped answering.");
   }
   if (error == EBUSY) throw Error("The camera " + path_ + " is in use by another program.");
-  throw Error("The camera " + path_ + " " + what + ": " + std::generic_category().message(error) + ".");
+  throw Error("The camera " + path_ + " " + what + ": " + std::generic_category().message(error) + "; " +
+              advice + ".");
 }
 
 void DeviceStream::Open() {
@@ -130,7 +131,7 @@ void DeviceStream::NegotiateRate(double fps) {
     interval = {1000, static_cast<std::uint32_t>(std::lround(wanted * 1000))};
     // A failure only matters if a rate was requested.
     if (system_->Control(file_, VIDIOC_S_PARM, &parameters) < 0 && fps > 0)
-      Fail("rejects this frame rate", errno);
+      Fail("rejects this frame rate", errno, "`docent cameras` lists its rates");
   }
   if (interval.numerator > 0 && interval.denominator > 0) {
     fps_ = static_cast<double>(interval.denominator) / interval.numerator;
@@ -143,7 +144,8 @@ void DeviceStream::StartStreaming() {
   request.type = V4L2_BUF_TYPE_VIDEO_CAPTURE;
   request.memory = V4L2_MEMORY_MMAP;
   if (system_->Control(file_, VIDIOC_REQBUFS, &request) < 0) Fail("provides no buffers", errno);
-  if (request.count < 2) throw Error("The camera " + path_ + " has no memory for its images.");
+  if (request.count < 2)
+    throw Error("The camera " + path_ + " has no memory for its images; " + kReplug + ".");
   for (std::uint32_t i = 0; i < request.count; ++i) {
     Loan loan;
     v4l2_buffer& buffer = loan.buffer;
@@ -189,7 +191,7 @@ std::optional<DeviceStream::Loan> DeviceStream::Take() {
     Fail("stopped sending images", errno);
   }
   if (loan.buffer.index >= buffers_.size())
-    throw Error("The camera " + path_ + " returned an unknown buffer.");
+    throw Error("The camera " + path_ + " returned an unknown buffer; " + kReplug + ".");
   const MappedBuffer& mapped = buffers_[loan.buffer.index];
   loan.bytes = {static_cast<const std::uint8_t*>(mapped.memory),
                 std::min<std::size_t>(loan.buffer.bytesused, mapped.length_bytes)};

@@ -72,7 +72,8 @@ class DeviceStream {
   void NegotiateRate(double fps);
   void StartStreaming();
   void Stop() noexcept;
-  [[noreturn]] void Fail(const std::string& what, int error) const;
+  static constexpr const char* kReplug = "unplug the camera and plug it in again";
+  [[noreturn]] void Fail(const std::string& what, int error, const std::string& advice = kReplug) const;
 
   const std::string path_;
   DeviceSystem* const system_;
