@@ -22,10 +22,10 @@ struct DrawingQuality {
 inline constexpr std::array<DrawingQuality, 6> kQualityLevels = {{
     {"the resolution of the window", 4, 2.0, true, true},
     {"the resolution of the camera", 4, 1.0, true, true},
-    {"no smoothed edges", 1, 1.0, true, true},
-    {"no shadows", 1, 1.0, false, true},
+    {"without anti-aliasing", 1, 1.0, true, true},
+    {"without shadows", 1, 1.0, false, true},
     {"half the resolution of the camera", 1, 0.5, false, true},
-    {"half the resolution, not smoothed", 1, 0.5, false, false},
+    {"half the resolution, without interpolation", 1, 0.5, false, false},
 }};
 
 // When the quality changes.

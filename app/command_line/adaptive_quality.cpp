@@ -49,7 +49,7 @@ void AdaptiveQuality::Apply(double pixels_per_pixel, ui::Renderer* renderer, ui:
 std::optional<std::string> AdaptiveQuality::Add(Clock::time_point begin, Clock::time_point now) {
   using Seconds = std::chrono::duration<double>;
   if (!controller_.Add(Seconds(now - start_).count(), Seconds(now - begin).count())) return std::nullopt;
-  return std::string("drawing with ") + controller_.quality().name;
+  return std::string("The quality of drawing was changed: ") + controller_.quality().name;
 }
 
 }  // namespace docent::app

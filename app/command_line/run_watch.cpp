@@ -19,7 +19,7 @@ void RunWatch::WatchLoad(std::size_t camera, const engine::TrackedFrame& tracked
                              " images were skipped in the last seconds";
   notices->events.push_back({tracked.frame.time, "load",
                              change->is_slow ? counts + "; the machine is too slow to track more"
-                                             : "the machine keeps up again: " + counts});
+                                             : "the machine is fast enough again: " + counts});
   if (change->is_slow && camera == 0) notices->sentence = strings_.device_is_slow;
 }
 
