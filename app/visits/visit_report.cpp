@@ -103,8 +103,8 @@ std::string TourTable(const std::vector<VisitRecord>& visits) {
 
 std::string MapTable(const std::vector<MapVisits>& maps) {
   std::string html =
-      "<h2>Maps that need care</h2>\n<p class=note>The map in which visitors are lost most often stands "
-      "first. "
+      "<h2>Where visitors are lost</h2>\n<p class=note>The maps are listed by how often visitors are lost in "
+      "them. "
       "Visitors are lost where a map has too few views: extend it there.</p>\n<table>" +
       TableRow("th", {"map", "visits", "median stay", "times lost", "per hour", "longest"});
   for (const MapVisits& map : maps)

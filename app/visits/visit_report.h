@@ -19,10 +19,10 @@ struct MapVisits {
   double LossesPerHour() const { return total_s > 0 ? 3600 * static_cast<double>(losses) / total_s : 0; }
 };
 
-// By descending losses per hour: the maps that need care first.
+// By descending losses per hour.
 std::vector<MapVisits> MapsByCare(const std::vector<VisitRecord>& visits);
 
-// A self-contained page for the operator of a museum: the days, the tours, the maps that need care, and for
+// A self-contained page for the operator of a museum: the days, the tours, where visitors are lost, and for
 // each map where visitors were and where they were lost, from above. `title` stands at its top.
 std::string FormatVisitReport(const std::vector<VisitRecord>& visits, const std::string& title);
 
