@@ -22,6 +22,10 @@ constexpr double kPointingError = 0.02;
 constexpr double kMaxMedianResidual = 0.25;  // Ratio of the extent.
 constexpr int kMaxTriples = 3000;            // All of up to 27 points; beyond, random ones.
 constexpr std::uint64_t kTripleSeed = 1;
+constexpr const char* kNoPose =
+    "No pose brings the points of the model to those in the map; check that each point of the model is "
+    "paired "
+    "with its own place.";
 
 using Points = std::vector<Eigen::Vector3d>;
 
@@ -167,11 +171,10 @@ Alignment AlignModel(std::span<const Correspondence> correspondences) {
   } else {
     pose = engine::AlignSim3(pairs.in_map, pairs.in_model);
   }
-  if (!pose) throw Error("The points of the model and those in the map fit no pose.");
+  if (!pose) throw Error(kNoPose);
   alignment.map_from_model = *pose;
   alignment.residuals = pairs.Residuals(*pose);
-  if (!(Quantile(alignment.residuals, pairs.size() / 2) <= kMaxMedianResidual * extent))
-    throw Error("The points of the model and those in the map fit no pose.");
+  if (!(Quantile(alignment.residuals, pairs.size() / 2) <= kMaxMedianResidual * extent)) throw Error(kNoPose);
   return alignment;
 }
 

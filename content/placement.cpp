@@ -163,7 +163,8 @@ SurfaceResult FindSurface(std::span<const Eigen::Vector3d> points_in_map, const 
                           const Eigen::Vector3d& ray_direction, const PlacementOptions& options,
                           std::optional<double> distance) {
   if (!ray_origin.allFinite() || !ray_direction.allFinite() || !(ray_direction.norm() > 0)) {
-    return {std::nullopt, "The lens has no ray for this pixel."};
+    return {std::nullopt,
+            "The lens does not see anything at this pixel; choose one nearer to the middle of the image."};
   }
   const Eigen::Vector3d ray = ray_direction.normalized();
   const std::vector<Neighbour> near = PointsNearRay(points_in_map, ray_origin, ray, options);

@@ -25,13 +25,6 @@ char LowerCase(char letter) {
   return letter >= 'A' && letter <= 'Z' ? static_cast<char>(letter - 'A' + 'a') : letter;
 }
 
-const char* PolicyText(const std::string& policy) {
-  for (const strings::PolicyText& text : strings::kPolicies) {
-    if (policy == text.policy) return text.label;
-  }
-  return policy.c_str();
-}
-
 bool HasMap(const AuthoringFacts& facts, const std::string& name) {
   return std::any_of(facts.maps.begin(), facts.maps.end(),
                      [&](const MapFacts& map) { return map.name == name; });
@@ -127,7 +120,7 @@ void MapSection::DrawName(const MapFacts& map, const AuthoringFacts& facts) {
 
 void MapSection::DrawPolicy(const MapFacts& map) {
   ImGui::SetNextItemWidth(0.65f * ImGui::GetContentRegionAvail().x);
-  if (!ImGui::BeginCombo(strings::kPolicy, PolicyText(map.policy))) return;
+  if (!ImGui::BeginCombo(strings::kPolicy, strings::PolicyLabel(map.policy.c_str()))) return;
   for (const strings::PolicyText& text : strings::kPolicies) {
     const bool is_this = map.policy == text.policy;
     if (ImGui::Selectable(text.label, is_this) && !is_this) actions_->SetPolicy(map.name, text.policy);

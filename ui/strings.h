@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <string_view>
+
 #include "content/scene.h"
 
 // All texts of the author's window, in one place, so that they can be read together and translated. Texts
@@ -80,6 +82,13 @@ inline constexpr PolicyText kPolicies[] = {
     {"augment-only", "Content only", "The map stays as it is; its content may be changed."},
     {"read-only", "None", "Nothing may be changed."},
 };
+// The label of a policy by its name on the command line; the name itself if there is none.
+inline const char* PolicyLabel(const char* policy) {
+  for (const PolicyText& text : kPolicies) {
+    if (std::string_view(policy) == text.policy) return text.label;
+  }
+  return policy;
+}
 
 // Place section.
 inline constexpr const char* kPlace = "Place";

@@ -4,6 +4,7 @@
 #include <filesystem>
 
 #include "content/occluder.h"
+#include "ui/strings.h"
 
 namespace docent::app {
 
@@ -19,7 +20,9 @@ struct DoneWriter {
   std::string operator()(const StopMap&) const { return "Stopped the map."; }
   std::string operator()(const UseMap& c) const { return "Continued the map " + c.name + "."; }
   std::string operator()(const SetPolicy& c) const {
-    return "The map " + c.name + " is " + maps::ToString(c.policy) + " now.";
+    if (c.policy == maps::Policy::kOpen) return "All changes to the map " + c.name + " are now allowed.";
+    return "Changes to the map " + c.name +
+           " are now limited to: " + ui::strings::PolicyLabel(maps::ToString(c.policy)) + ".";
   }
   std::string operator()(const RenameMap& c) const {
     return "Renamed the map " + c.name + " to " + c.new_name + ".";

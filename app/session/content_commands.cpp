@@ -49,12 +49,13 @@ SessionMap& ContentCommands::MapToEdit(const engine::TrackedFrame& frame) {
   const std::uint64_t key =
       engine::HasPose(frame.state) ? frame.map_key : system_.CurrentMap(CameraOf(frame));
   SessionMap* const map = state_.FindMap(key);
-  if (map == nullptr || !map->snapshot) throw Error("there is no current map");
-  if (map->discarded) throw Error("the map of this frame was discarded");
+  if (map == nullptr || !map->snapshot)
+    throw Error("there is no current map; start one, or point the camera at a place of a map");
+  if (map->discarded)
+    throw Error("the map of this image was discarded; make the change in the map that is current now");
   if (!map->Exists()) throw Error("the map of this frame was joined into another one");
   if (!maps::MayChangeContent(map->policy)) {
-    throw Error("the map '" + map->name + "' is " + maps::ToString(map->policy) +
-                ": its content cannot be changed");
+    throw Error(map->PolicyInWords() + "; its content cannot be changed");
   }
   return *map;
 }

@@ -79,7 +79,7 @@ void MapCommands::Apply(const RenameMap& command, const engine::TrackedFrame& fr
   if (map == nullptr) throw Error("there is no map '" + command.name + "'");
   if (command.new_name == command.name) throw Error("the map has this name already");
   if (!maps::MayChangeContent(map->policy)) {
-    throw Error("the map '" + map->name + "' is " + maps::ToString(map->policy) + ": it cannot be renamed");
+    throw Error(map->PolicyInWords() + "; it cannot be renamed");
   }
   const bool stored = saving_.FlushToLibrary(map->key, command.name, frame.frame.time, lock);
   if (state_.FindByName(command.new_name) != nullptr)
@@ -94,7 +94,7 @@ void MapCommands::Apply(const RemoveMap& command, const engine::TrackedFrame& fr
   SessionMap* const map = state_.FindByName(command.name);
   if (map == nullptr) throw Error("there is no map '" + command.name + "'");
   if (!maps::MayRemove(map->policy)) {
-    throw Error("the map '" + map->name + "' is " + maps::ToString(map->policy) + ": it cannot be removed");
+    throw Error(map->PolicyInWords() + "; it cannot be removed");
   }
   // The library may still have the maps that were joined into it.
   if (!map->joined_keys.empty()) saving_.SaveMap(map, frame.frame.time);
@@ -113,8 +113,7 @@ void MapCommands::Apply(const JoinMap& command, const engine::TrackedFrame& fram
   if (system_.IsInUse(from.key))
     throw Error("the map '" + from.name + "' is in use and cannot be joined now");
   for (const SessionMap* map : {&from, into}) {
-    if (map->policy != maps::Policy::kOpen)
-      throw Error("the map '" + map->name + "' is " + maps::ToString(map->policy) + ": it cannot be joined");
+    if (map->policy != maps::Policy::kOpen) throw Error(map->PolicyInWords() + "; it cannot be joined");
   }
   if (system_.ActiveMap() != into->key)
     throw Error("the map '" + into->name + "' is not being extended; continue it first");

@@ -3,6 +3,8 @@
 
 #include <utility>
 
+#include "ui/strings.h"
+
 namespace docent::app {
 
 void SessionMap::Discard() {
@@ -33,6 +35,11 @@ void SessionMap::SetMesh(std::shared_ptr<const engine::MapMesh> made,
 
 bool SessionMap::HasCurrentMesh() const {
   return mesh && snapshot && engine::StateOf(mesh->keyframes, *snapshot) == engine::MeshState::kCurrent;
+}
+
+std::string SessionMap::PolicyInWords() const {
+  return "changes to the map '" + name +
+         "' are limited to: " + ui::strings::PolicyLabel(maps::ToString(policy));
 }
 
 engine::MapPermissions SessionMap::Permissions() const {

@@ -74,6 +74,8 @@ struct SessionMap {
 
   // What the system may do with the map, from its policy and from what happened to it.
   engine::MapPermissions Permissions() const;
+  // Which changes the policy allows, as the author's window calls it; the beginning of a sentence.
+  std::string PolicyInWords() const;
 
   // The map ends. Reports count what it contained, so its numbers are kept; its images, which need most of
   // its memory, and its surfaces are not.

@@ -26,7 +26,9 @@ PointedAt PointAt(const engine::TrackedFrame& frame, const engine::CameraModel& 
   at.pixel = "pixel " + std::to_string(std::lround(pixel.x())) + " " + std::to_string(std::lround(pixel.y()));
   if (!camera.IsInside(pixel, -0.5)) throw Error(at.pixel + " lies outside the image");
   const auto ray = camera.Unproject(pixel);
-  if (!ray) throw Error("the camera model has no ray for " + at.pixel);
+  if (!ray)
+    throw Error("the lens does not see anything at " + at.pixel +
+                "; click nearer to the middle of the image");
   for (const engine::MapPoint& point : frame.map->points) {
     if (point.infinite()) continue;
     const auto seen = camera.Project(frame.camera_from_map * point.position());
@@ -65,7 +67,7 @@ void AddMeasuredPoints(const engine::TrackedFrame& frame, const engine::CameraMo
 
 void RequirePose(const engine::TrackedFrame& frame) {
   if (!engine::HasPose(frame.state) || !frame.map)
-    throw Error("nothing can be placed while the camera is lost");
+    throw Error("nothing can be placed while the camera is lost; point it at the map first");
 }
 
 content::SurfaceHit SurfaceAtPixel(const engine::TrackedFrame& frame, const engine::CameraModel& camera,

@@ -118,7 +118,7 @@ TEST(AlignModel, RefusesWhatDeterminesNoPose) {
   const Eigen::Vector3d nan = std::numeric_limits<double>::quiet_NaN() * x;
   EXPECT_THAT(refusal({{o, o}, {x, nan}, {y, y}}), HasSubstr("not finite"));
   // A square whose corners were given in the wrong order.
-  EXPECT_THAT(refusal({{o, o}, {x, x + y}, {x + y, x}, {y, y}}), HasSubstr("fit no pose"));
+  EXPECT_THAT(refusal({{o, o}, {x, x + y}, {x + y, x}, {y, y}}), HasSubstr("No pose brings the points"));
   EXPECT_EQ(refusal({{o, o}, {x, x}, {x + y, x + y}, {y, y}}), "");
 }
 

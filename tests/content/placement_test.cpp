@@ -115,7 +115,8 @@ TEST(FindSurface, GivesTheReasonWhenThereIsNoHit) {
   const std::vector<Eigen::Vector3d> two = {{0, 0, 1}, {0.01, 0, 1}};
   EXPECT_EQ(FindSurface(two, origin, ahead).reason,
             "The map has too few points near this pixel; choose a place with more detail.");
-  EXPECT_EQ(FindSurface(two, origin, Eigen::Vector3d::Zero()).reason, "The lens has no ray for this pixel.");
+  EXPECT_EQ(FindSurface(two, origin, Eigen::Vector3d::Zero()).reason,
+            "The lens does not see anything at this pixel; choose one nearer to the middle of the image.");
 }
 
 TEST(FindSurface, IsInvariantToScaleAndPoseOfTheMap) {

@@ -276,9 +276,9 @@ TEST_F(ContentInASession, NothingIsPlacedAtCoordinatesWhileTheCameraIsLost) {
     const engine::TrackedFrame posed = frame_;
     frame_.state = engine::TrackingState::kLost;
     frame_.map.reset();
-    EXPECT_EQ(Do(PlaceTrail{{a, b}}), "nothing can be placed while the camera is lost");
-    EXPECT_EQ(Do(PlaceOccluder{content::Occluder::Shape::kBox, std::nullopt, {a}}),
-              "nothing can be placed while the camera is lost");
+    EXPECT_THAT(Do(PlaceTrail{{a, b}}), HasSubstr("nothing can be placed while the camera is lost"));
+    EXPECT_THAT(Do(PlaceOccluder{content::Occluder::Shape::kBox, std::nullopt, {a}}),
+                HasSubstr("nothing can be placed while the camera is lost"));
     // A point is added where it is told, wherever the camera is.
     EXPECT_EQ(Do(ExtendTrail{"trail-1", c}), "");
     frame_ = posed;
@@ -383,8 +383,8 @@ TEST_F(ContentInASession, MapsAreRenamedAndRemovedWithTheSignpostsThatLeadToThem
   EXPECT_EQ(sign_in(hall).to_key, bay);
   EXPECT_THAT(Do(JoinMap{"Hall"}), HasSubstr("no current map"));
   ASSERT_EQ(Do(SetPolicy{"Cove", maps::Policy::kReadOnly}), "");
-  EXPECT_THAT(Do(RenameMap{"Cove", "Bay"}), HasSubstr("read-only: it cannot be renamed"));
-  EXPECT_THAT(Do(RemoveMap{"Cove"}), HasSubstr("read-only: it cannot be removed"));
+  EXPECT_THAT(Do(RenameMap{"Cove", "Bay"}), HasSubstr("limited to: None; it cannot be renamed"));
+  EXPECT_THAT(Do(RemoveMap{"Cove"}), HasSubstr("limited to: None; it cannot be removed"));
   ASSERT_EQ(Do(SetPolicy{"Cove", maps::Policy::kOpen}), "");
   ASSERT_EQ(Do(RemoveMap{"Cove"}), "");
   EXPECT_THAT(Do(UseMap{"Cove"}), HasSubstr("no map 'Cove'"));
@@ -436,7 +436,7 @@ TEST_F(ContentInASession, ContentIsPastedFromAnotherMapAndSignpostsLeadToOtherMa
               EXPECT_THAT(Do(JoinMap{"Attic"}), HasSubstr("no map 'Attic'"));
               EXPECT_THAT(Do(JoinMap{here}), HasSubstr("'Bay' is the current map already"));
               ASSERT_EQ(Do(SetPolicy{there, maps::Policy::kReadOnly}), "");
-              EXPECT_THAT(Do(JoinMap{there}), HasSubstr("'Hall' is read-only: it cannot be joined"));
+              EXPECT_THAT(Do(JoinMap{there}), HasSubstr("'Hall' are limited to: None; it cannot be joined"));
               ASSERT_EQ(Do(SetPolicy{there, maps::Policy::kOpen}), "");
               const double ratio = 0.5;  // of the distances that the first keyframes see
               EXPECT_THAT(Do(PlaceSignpost{"x", kPixel, here}), HasSubstr("cannot lead to its own map"));
