@@ -19,7 +19,7 @@ constexpr int kMainSide_px = 512, kContactSide_px = 256;
 constexpr float kContactReach = 0.15f;
 // The longest shadow, relative to the height of its caster: that of a light 18 degrees above the ground.
 constexpr float kLongestShadow = 3.0f;
-// Of more casters than this, the farther ones from the eye have no wide shadow of their body. The shader has
+// Of more casters than this, the farther ones from the eye have no ambient occlusion. The shader has
 // as many.
 constexpr int kMostBodies = 16;
 // How far that shadow reaches from the middle of its caster, in halves of its size; as kBodyReach2 of the

@@ -11,8 +11,8 @@
 
 namespace docent::ui {
 
-// The shadows that content casts on the room: one from the main light, where it is known, and one around the
-// contact with the surface that the content stands on, and the wide one of its body, which take light from
+// The shadows that content casts on the room: one from the main light, where it is known, the contact shadow
+// on the surface that the content stands on, and ambient occlusion by its body, which take light from
 // all sides away. They fall on the surfaces of the map; where none is known, on the plane that each model
 // stands on. Single thread, single context. The depths of casters that stand still are kept from view to
 // view.
