@@ -58,7 +58,7 @@ void Mapper::ResumeFrom(const MapSnapshot* snapshot) {
   panoramas_.Reset();
 }
 
-void Mapper::HoldKeyFrames() {
+void Mapper::FixKeyFrames() {
   for (auto& [id, record] : workspace_.map.keyframes()) record.keyframe.fixed = true;
 }
 
@@ -77,7 +77,7 @@ void Mapper::RemoveOldTemporaryKeyFrames() {
 void Mapper::Adopt(std::shared_ptr<const MapSnapshot> snapshot) {
   ResumeFrom(snapshot.get());
   refinement_.ForgetReadouts();
-  if (options_.temporary) HoldKeyFrames();
+  if (options_.temporary) FixKeyFrames();
   queue_.Clear();
   output_.Publish(std::move(snapshot));
 }

@@ -50,8 +50,8 @@ class Mapper {
   std::vector<EstimatedLens> Lenses() const { return output_.Lenses(); }
 
  private:
-  // Holds the poses of the keyframes that the map has now.
-  void HoldKeyFrames();
+  // Fixes the poses of the keyframes that the map has now.
+  void FixKeyFrames();
   // Removes the oldest temporary keyframes above their largest number (FindOldestKeyFrame).
   void RemoveOldTemporaryKeyFrames();
   // Resets the state of the stepping thread to a map; the queue is not changed.

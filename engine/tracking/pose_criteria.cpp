@@ -41,7 +41,7 @@ bool PoseCriteria::IsGood(const MapTrackResult& result) const {
   return result.Quality() >= options_.good_quality || HasConsensus(result);
 }
 
-bool PoseCriteria::HoldsTrack(const MapTrackResult& result) const {
+bool PoseCriteria::KeepsTrackWithFewPoints(const MapTrackResult& result) const {
   if (options_.build_maps || !result.converged || result.observed != ObservedMotion::kSixDof) return false;
   if (result.occupied_cells < options_.min_relocalization_cells || result.Quality() < options_.lost_quality)
     return false;

@@ -19,7 +19,7 @@ class PoseCriteria {
   // Keeps the track with few points that fit closely, for cameras whose images show little of the map because
   // of their field of view or photometric differences. Only while maps are not extended, and only continuing
   // a recent pose: no place is recognized by such a pose.
-  bool HoldsTrack(const MapTrackResult& result) const;
+  bool KeepsTrackWithFewPoints(const MapTrackResult& result) const;
   // Good tracking quality: the map may be extended.
   bool IsGood(const MapTrackResult& result) const;
   // Whether a pose that is a pure rotation fits the measurements; true for all other poses.

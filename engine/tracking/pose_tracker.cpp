@@ -264,7 +264,7 @@ PoseTracker::Estimate PoseTracker::Track(const MapSnapshot& map, const CameraIma
     }
     result = TryFrom(map, image, predicted, MapTracker::Effort::kWide, random);
   }
-  if (!criteria_.IsAccepted(result, comparison_) && !criteria_.HoldsTrack(result)) {
+  if (!criteria_.IsAccepted(result, comparison_) && !criteria_.KeepsTrackWithFewPoints(result)) {
     map_tracker_.ForgetLastFrame();
     SetCamera(lens_);
     if (!options_.hybrid) return {Outcome::kLost, result};

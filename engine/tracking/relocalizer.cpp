@@ -50,11 +50,11 @@ Relocalizer::Attempt Relocalizer::SearchNearby(const PoseSearch& search, Tracked
   if (!options_.build_maps && !search.has_odometry) {
     // With too few patches on the upper levels for a pose, the predicted pose may still be good.
     for (const auto effort : {MapTracker::Effort::kStandard, MapTracker::Effort::kWide}) {
-      if (rejection == RejectionReason::kNone || search.criteria.HoldsTrack(result)) break;
+      if (rejection == RejectionReason::kNone || search.criteria.KeepsTrackWithFewPoints(result)) break;
       result = track(effort);
     }
     // So soon after the loss and so near, what suffices to hold the track needs no confirmation.
-    if (search.criteria.HoldsTrack(result)) {
+    if (search.criteria.KeepsTrackWithFewPoints(result)) {
       *found = FoundPose{FoundPose::How::kNearby, search.map, search.map_key, result};
       return Attempt::kFound;
     }

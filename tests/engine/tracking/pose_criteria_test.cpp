@@ -101,10 +101,10 @@ TEST(PoseCriteria, HoldTheTrackByFewTightInliersWithoutMappingOnly) {
   pose.attempted = 60;
   pose.inliers = 20;
   pose.sigma = 0.7;
-  EXPECT_TRUE(PoseCriteria{ReadOnly()}.HoldsTrack(pose));
-  EXPECT_FALSE(PoseCriteria{TrackerOptions()}.HoldsTrack(pose));
+  EXPECT_TRUE(PoseCriteria{ReadOnly()}.KeepsTrackWithFewPoints(pose));
+  EXPECT_FALSE(PoseCriteria{TrackerOptions()}.KeepsTrackWithFewPoints(pose));
   pose.sigma = 1.2;
-  EXPECT_FALSE(PoseCriteria{ReadOnly()}.HoldsTrack(pose));
+  EXPECT_FALSE(PoseCriteria{ReadOnly()}.KeepsTrackWithFewPoints(pose));
 }
 
 TEST(PoseCriteria, SayWhyAPoseAfterALossIsRejected) {
