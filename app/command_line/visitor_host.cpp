@@ -49,7 +49,7 @@ VisitorHost::VisitorHost(const GuideRequest& request, Session* session, std::siz
     times.left = 120;  // As VisitRecorder ends a visit.
     left_tour_.emplace(times, false);
   } else if (route_) {
-    // Who leads by gaze alone has nothing to answer with.
+    // A visitor who chooses by gaze alone has nothing to answer with.
     left_tour_.emplace(times, !request.gaze);
   }
   for (std::size_t i = 0; i < cameras; ++i) Welcome(i);

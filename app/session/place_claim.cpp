@@ -4,7 +4,7 @@
 namespace docent::app {
 
 bool PlaceClaim::Update(double seconds, engine::TrackingState state, std::uint64_t map_key) {
-  // Who turns on the spot sees no error, and who walks has gone two steps in this time.
+  // A visitor who turns on the spot sees no error, and one who walks has gone two steps in this time.
   constexpr double kRotationAlone_s = 2;
   if (!engine::HasPose(state)) return false;
   if (map_key != map_key_) position_s_.reset();

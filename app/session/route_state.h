@@ -48,8 +48,8 @@ class RouteState {
  public:
   enum class Visit { kAhead, kSeen, kSkipped };
 
-  // A later stop can be seen from afar, or crossed; only who is there for so long has come to it. A longer
-  // pause without a pose interrupts the stay.
+  // A later stop can be seen from afar, or crossed; only a visitor who is there for this long has come to it.
+  // A longer pause without a pose interrupts the stay.
   static constexpr double kStay_s = 3, kPause_s = 1;
 
   explicit RouteState(Route route);

@@ -89,7 +89,7 @@ bool UntrackedImages::Fetch(const std::stop_token& done) {
     if (has_ended_) return false;
     frame.camera = camera_;
     frame.time -= offset_;
-    // A device that is away; who tracks will say so.
+    // A device that is away; the thread that tracks will say so.
     if (!late && frame.image.empty()) return false;
     Add(frame);
     if (late && (frame.image.empty() || clock_->IsLate(frame.time, period_))) continue;

@@ -14,7 +14,7 @@ namespace docent::app {
 struct VisitTimes {
   double arrival = 2.5;  // A place is announced for this long, enough to read two short words twice.
   double fade = 0.4;     // The announcement appears and disappears within this time.
-  // Who is not recognized within this time is shown the entrances of the likeliest places: most are
+  // A visitor who is not recognized within this time is shown the entrances of the likeliest places: most are
   // recognized sooner.
   double entrances = 1.5;
   // The welcome stays for this long, enough to read it; that nothing is recognized yet is not said before.

@@ -82,7 +82,7 @@ void VisitorCards::Look(const engine::CameraModel& camera, ui::VisitorDisplay* d
   const double looked_s = seconds_ - looked_since_s_;
   display->dwell = 0;
   if (open_) {
-    // Who is lost may still look at it.
+    // A visitor who is lost may still look at it.
     if (!has_pose_) looked_since_s_ = seconds_;
     if (looked_at_ != open_->entity && has_pose_ && looked_s >= times_.leave) open_.reset();
     return;

@@ -12,7 +12,7 @@ void VisitorGuide::Guide(const std::shared_ptr<ShownFrame>& frame, const engine:
   frame->visitor = state_.Update(frame->seconds, has_pose ? frame->shown.map_name : std::string(), hint);
   FindViews(*frame);
   frame->visitor->views = views_;
-  // Who is nearly recognized is not to go elsewhere.
+  // A visitor who is nearly recognized is not to go elsewhere.
   const bool says_little = hint.empty() || hint == strings_.not_recognized;
   if (!views_.empty() && says_little && !state_.Welcomes(frame->seconds))
     frame->visitor->sentence = strings_.go_to_a_view;
@@ -81,12 +81,12 @@ void VisitorGuide::FollowRoute(bool has_pose, ShownFrame* frame) {
   // The end is said where it is not overlooked, and stays in the corner after that.
   constexpr double kEndSaid_s = 8;
   if (route_->Target()) finished_s_.reset();
-  // Who searches for a known place is helped first; other hints can wait.
+  // A visitor who searches for a known place is helped first; other hints can wait.
   if (!route_->Target() && !display.is_searching) {
     if (!finished_s_) finished_s_ = frame->seconds;
     if (frame->seconds - *finished_s_ < kEndSaid_s) display.sentence = display.route_line;
   }
-  // Who is lost finds among the stops those that are near.
+  // A visitor who is lost finds among the stops those that are near.
   if (!display.stops.empty()) display.stops = display.route_stops;
 }
 

@@ -56,7 +56,7 @@ constexpr NamedOption kOptions[] = {
      [](double value, Options* options) { options->build_s = value; }},
     {"rounds", "N", "how often all bays or desks are visited after they were built", 1, 1000,
      [](double value, Options* options) { options->rounds = static_cast<int>(value); }, true},
-    {"rest", "SECONDS", "the person rests for so long, with the lens covered, at the time of rest-at", 0,
+    {"rest", "SECONDS", "how long the person rests, with the lens covered; the rest begins at rest-at", 0,
      3600, [](double value, Options* options) { options->rest_s = value; }},
     {"rest-at", "SECONDS", "when the rest begins, seconds from the first image", 0, 86400,
      [](double value, Options* options) { options->rest_at_s = value; }},

@@ -46,8 +46,8 @@ struct SimulationOptions {
   // often all places are visited then.
   double build_s = 0;
   int rounds = 1;
-  // At this time of the sequence the person rests for so long: the camera stays where it is, and its lens is
-  // covered.
+  // At this time of the sequence the person rests for this long: the camera stays where it is, and its lens
+  // is covered.
   double rest_at_s = 0, rest_s = 0;
   CameraFaults faults;
   std::uint64_t seed = 1;

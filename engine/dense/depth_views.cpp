@@ -88,7 +88,7 @@ std::vector<KeyFrameId> BestNeighbours(const ObservedPoints& view, std::vector<S
   return chosen;
 }
 
-// False if too few points tell the range.
+// False if too few points determine the range.
 bool FindRange(const ObservedPoints& view, const DepthViewOptions& options, DepthViews* result) {
   std::vector<double> inverse;
   for (const MapPoint* const point : view.points) {

@@ -19,7 +19,7 @@ struct DepthViewOptions {
   // of a pair falls by exp(-1/2) when the parallax differs by these from the best one (as MVSNet, Yao et al.
   // 2018, but with a larger best angle, since keyframes of a hand-held camera are further apart).
   double best_parallax_deg = 7, less_parallax_deg = 3, more_parallax_deg = 10;
-  int min_points = 20;  // Fewer visible points do not tell the range of distances.
+  int min_points = 20;  // Fewer visible points do not determine the range of distances.
   // The range ends this factor beyond the distances of 98 % of the points.
   double range_margin = 1.5;
 

@@ -90,8 +90,8 @@ std::vector<double> DistancesNear(const PixelPatch& patch, const MapSnapshot& ma
   return chosen;
 }
 
-// The keyframes whose images tell the distance of a surface best: those that see it with a parallax near the
-// best one; see DepthViewOptions.
+// The keyframes whose images determine the distance of a surface best: those that see it with a parallax near
+// the best one; see DepthViewOptions.
 std::vector<const KeyFrame*> ChooseKeyframes(const PixelPatch& patch, double distance, const MapSnapshot& map,
                                              int max_count) {
   constexpr double kBest_deg = 8, kLess_deg = 3, kMore_deg = 12, kMin_deg = 1, kMax_deg = 35;

@@ -65,16 +65,16 @@ class Initializer {
                                       std::vector<InitialPair::Match> matches,
                                       std::span<const std::uint32_t> ids, double speed_change_px,
                                       const ReadoutSource& readout);
-  // What the corners tell that are tracked since the oldest first view. Empty if they do not tell it, or if
-  // the calibration of the camera states it. Estimated once per image, although all pairs of views ask for
+  // Estimated from the corners that are tracked since the oldest first view. Empty if they do not suffice, or
+  // if the calibration of the camera states it. Estimated once per image, although all pairs of views ask for
   // it.
   std::optional<TrackReadout> ReadoutFromCorners();
   // The search ended with this pair, or with one of other views of the camera. If it does not know the
-  // readout time, the corners are tracked on through the next images, which may tell it.
+  // readout time, the corners are tracked on through the next images, which may determine it.
   void EndWith(const InitialPair& pair);
   bool is_following() const { return following_; }
-  // To be called for each image while is_following(). Returns the corners where their number of images tells
-  // more than before.
+  // To be called for each image while is_following(). Returns the corners when they have been
+  // tracked in enough more images for another estimate.
   std::optional<TrackedCorners> Follow(Timestamp time, const std::shared_ptr<const ImageFeatures>& features);
 
   // Whether the views that were tried last have depth, which a third view has yet to confirm.

@@ -38,7 +38,7 @@ struct TrackReadoutOptions {
   std::optional<std::string> Validate() const;
 };
 
-// What the motion of corners tells of a rolling shutter.
+// The readout time of a rolling shutter, estimated from the motion of corners.
 struct TrackReadout {
   // Seconds, as in ReadoutMotion: rows are exposed one after another, or columns, so that one entry is zero.
   Eigen::Vector2d readout_s = Eigen::Vector2d::Zero();
@@ -55,7 +55,8 @@ struct TrackReadout {
 std::optional<TrackReadout> EstimateTrackReadout(const TrackReadoutOptions& options,
                                                  const CameraModel& camera, const CornerSequence& sequence);
 
-// What an estimate tells; empty unless it is significant. An estimate near zero may be a failed adjustment.
+// The readout time of an estimate; empty unless it is significant. An estimate near zero may be a failed
+// adjustment.
 std::optional<ReadoutPrior> SignificantReadout(const TrackReadoutOptions& options,
                                                const TrackReadout& estimate);
 

@@ -14,7 +14,7 @@ bool IsRotatingImage(const CameraModel& image, const CameraModel& camera) {
   return !image.readout_motion().rotation_rate.isZero(0) && image.HasSameLens(camera);
 }
 
-// The readout time that a joined map has for a lens; empty if no image tells one.
+// The readout time that a joined map has for a lens; empty if no image has one.
 std::optional<Eigen::Vector2d> ReadoutOfBoth(KeyFrameId first_of_b, const CameraModel& lens, const Map& map) {
   std::array<const CameraModel*, 2> newest = {nullptr, nullptr};  // of A and of B
   for (const auto& [id, record] : map.keyframes()) {

@@ -20,8 +20,8 @@ std::optional<Eigen::Vector2d> ReadoutIn(const Map& map, const CameraModel& came
 // known.
 double LargestRotationRateIn(const MapSnapshot& map, const CameraModel& camera);
 
-// The model of an image with the readout time that its lens has in a map: `camera` itself if the map does not
-// tell, the rotation is not known, or the readout time of the camera is known (CameraModel::known_readout_s).
+// The model of an image with the readout time that its lens has in a map: `camera` itself if the map has
+// none, the rotation is not known, or the readout time of the camera is known (CameraModel::known_readout_s).
 std::shared_ptr<const CameraModel> WithReadoutIn(const Map& map,
                                                  const std::shared_ptr<const CameraModel>& camera);
 
@@ -30,8 +30,8 @@ std::shared_ptr<const CameraModel> WithReadoutIn(const Map& map,
 bool SetReadout(const CameraModel& camera, const Eigen::Vector2d& readout_s, Map* map);
 
 // The same for all lenses of two maps in one, of which B has the keyframes from first_of_b on. All images of
-// a lens get what a calibration states; otherwise what A tells, or B if A tells none. A readout time of zero
-// tells none, because that of a rolling shutter is zero until it is estimated.
+// a lens get what a calibration states; otherwise that of A, or of B if A has none. A readout time of zero
+// counts as none, because that of a rolling shutter is zero until it is estimated.
 void UniteReadouts(KeyFrameId first_of_b, Map* map);
 
 }  // namespace docent::engine

@@ -26,10 +26,10 @@ class MapRefinement {
                 MapperOutput* output)
       : options_(options), interrupt_(interrupt), workspace_(workspace), output_(output) {}
 
-  // Another map, or this one joined with another: nothing is due, and no keyframe is the newest. What corners
-  // told of readout times remains.
+  // Another map, or this one joined with another: nothing is due, and no keyframe is the newest. Readout
+  // times that were estimated from corners remain.
   void Reset();
-  // Another map: what corners told of readout times is dropped too.
+  // Another map: readout times that were estimated from corners are dropped too.
   void ForgetReadouts() { known_readouts_.clear(); }
   // Drops what refers to keyframes and points of a map that is being replaced.
   void Forget();
@@ -54,9 +54,9 @@ class MapRefinement {
   // Searches the new points in the keyframes that share most points with the newest one.
   void MatchNewPoints();
   void AdjustAroundNewest();
-  // What the corners of the initialization tell of the readout time of a lens.
+  // The readout time of a lens that was estimated from the corners of the initialization.
   void SetReadoutPrior(const std::optional<ReadoutPrior>& prior, std::shared_ptr<const CameraModel> lens);
-  // Estimates the readout time from corners if none have told it yet, and adjusts the map if it changes.
+  // Estimates the readout time from corners unless it was before, and adjusts the map if it changes.
   void EstimateReadout(const TrackedCorners& corners);
   // Estimates the readout time of the newest keyframe's camera. True if it changed, so that the map has to be
   // adjusted.
@@ -66,7 +66,7 @@ class MapRefinement {
   void CullRedundantKeyFrame();
 
  private:
-  // The readout time of a lens once corners have told it. It is a constant, so each estimate is the prior of
+  // The readout time of a lens, estimated from corners. It is a constant, so each estimate is the prior of
   // the next: in a fast pan the newest keyframes alone were wrong by 6 ms.
   struct KnownReadout {
     std::shared_ptr<const CameraModel> lens;

@@ -20,7 +20,8 @@ namespace docent::engine {
 // thread, but work begins and ends on the stepping thread.
 class MapperQueue {
  public:
-  // A keyframe to be inserted, two views that start a map, or corners that tell the readout time of a camera.
+  // A keyframe to be inserted, two views that start a map, or corners that determine the readout time of a
+  // camera.
   using Request = std::variant<KeyFrameCandidate, InitialPair, TrackedCorners>;
 
   // max_length: requests that wait at most.

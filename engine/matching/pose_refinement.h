@@ -89,7 +89,8 @@ struct MotionPrior {
   // If false, the pivot is used only where the translation is not observable and infinite points are
   // projections.
   bool reliable = false;
-  // Where the camera centre is predicted, if it is; used where neither the points nor a rotation tell it.
+  // Where the camera centre is predicted, if it is; used where neither the points nor a rotation determine
+  // it.
   std::optional<PredictedPosition> center = std::nullopt;
 };
 

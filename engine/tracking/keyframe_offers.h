@@ -34,8 +34,8 @@ class KeyFrameOffers {
     double median_depth = 1;      // map units, of the finite points
   };
   // Offers the frame if it should become a keyframe. When the points were lost from one frame to the next, so
-  // that only the whole image tells the rotation, the last frame that had a position is offered instead, as
-  // the reference of a panorama map.
+  // that only the whole image determines the rotation, the last frame that had a position is offered instead,
+  // as the reference of a panorama map.
   void Consider(const CameraImage& image, const MapSnapshot& map, const TrackedPose& pose);
   // Offers the first image of a map that is empty so far.
   void OfferFirst(const CameraImage& image);

@@ -66,7 +66,7 @@ class PoseTracker {
   // For relocalization.
   // The last pose, moved on by the rotation of the images or else by the motion model.
   Rigid3 PredictAfterLoss(const CameraImage& image) const;
-  // Assumes this pose, which was tried in vain, in the next frame.
+  // Predicts the next frame from this pose, although no pose was found there in this one.
   void MissAt(Timestamp time, const Rigid3& camera_from_map);
   // This tracker of the same camera has the pose of the present frame.
   void Follow(const PoseTracker& other, Timestamp time);
@@ -98,12 +98,12 @@ class PoseTracker {
  private:
   // Gives the present image the rolling shutter of a camera that moves with this left twist per second.
   void SetTwist(const Eigen::Matrix<double, 6, 1>& twist);
-  // Takes the readout time from a snapshot that has not been asked yet, unless the calibration states it.
+  // Takes the readout time from a snapshot that has not been read yet, unless the calibration states it.
   void UpdateReadout(const MapSnapshot& map);
-  // Whether the residuals of the present image may tell the readout time: no map or calibration has told it,
-  // and the images of the map were not taken while turning as fast.
+  // Whether the readout time may be estimated from the residuals of the present image: no map has it yet,
+  // nor a calibration, and the images of the map were not taken while turning as fast.
   bool MayEstimateReadout() const;
-  // Repeats the pose estimate with the motion that it implies, and lets it tell the readout time.
+  // Repeats the pose estimate with the motion that it implies, and estimates the readout time from it.
   void AccountForReadout(const CameraImage& image, const Rigid3& predicted, MapTrackResult* result);
   // The panorama map to search: the open one, or one to whose centre the camera has returned if the finite
   // points do not cover the image.
@@ -142,12 +142,12 @@ class PoseTracker {
   // rotation, a later one.
   std::shared_ptr<const ImageFeatures> rotation_reference_;
   Rigid3 rotation_reference_pose_;
-  // The readout time of the calibration goes first, then that of a map that this camera builds; elsewhere,
-  // and until that map tells it, it is estimated here.
+  // The readout time of the calibration takes precedence, then that of a map that this camera builds;
+  // elsewhere, and until that map has one, it is estimated here.
   Eigen::Vector2d readout_s_ = Eigen::Vector2d::Zero();
   bool readout_is_known_ = false;   // by the calibration or the map
   double largest_rate_in_map_ = 0;  // while that is unknown: of this camera's images, radians per second
-  const MapSnapshot* readout_map_ = nullptr;  // the snapshot that was asked last, never dereferenced
+  const MapSnapshot* readout_map_ = nullptr;  // the snapshot that was read last, never dereferenced
   std::uint64_t readout_revision_ = 0;
   ReadoutEstimator readout_;
   // Left twist per second between the last two frames, as long as the track goes on.

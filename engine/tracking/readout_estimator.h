@@ -25,7 +25,7 @@ struct ReadoutOptions {
   double min_sigmas = 4;
   double min_readout_s = 0.007;
   double min_change_s = 0.001;
-  double min_rate = 0.1;  // radians per second; a slower rotation tells nothing
+  double min_rate = 0.1;  // radians per second; a slower rotation does not determine it
   int min_inliers = 60;   // finite points of a frame
   int max_points = 120;   // finite points used per frame; more cost time and add little
 

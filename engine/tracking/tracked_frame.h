@@ -52,8 +52,8 @@ struct TrackedFrame {
   int finite_points = 0, infinite_points = 0;  // inliers
   std::vector<PointMatch> matches;             // map points that were found in the image
   std::chrono::nanoseconds tracking_time{};    // by the system clock
-  // The map itself does not tell this pose: it is continued by points of this visit (VisualOdometry), so that
-  // it is less certain, and there are no matches.
+  // The map itself does not determine this pose: it is continued by points of this visit (VisualOdometry), so
+  // that it is less certain, and there are no matches.
   bool by_odometry = false;
   bool left_map = false;    // lost because the camera translated where only infinite points are mapped
   Hint hint = Hint::kNone;  // what a person can do so that tracking works

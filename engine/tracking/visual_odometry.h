@@ -30,11 +30,11 @@ class VisualOdometry {
   // To be called before each frame.
   void BeginFrame() { offers_.BeginFrame(); }
 
-  // Points of the map tell the pose of this image, which ends the odometry. Where they are few, and the
+  // Points of the map determine the pose of this image, which ends the odometry. Where they are few, and the
   // quality is good, the image is offered as a keyframe of the copy.
   void AddMapPose(const CameraImage& image, const MapSnapshot& map, const KeyFrameOffers::TrackedPose& pose,
                   bool good);
-  // The map does not tell the pose of the present image any more: the odometry goes on from the last one, if
+  // The map no longer determines the pose of the present image: the odometry goes on from the last one, if
   // there is a copy and that pose came from points.
   void Begin(const PoseTracker& lost);
   bool is_active() const { return active_; }

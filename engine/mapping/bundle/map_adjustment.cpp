@@ -24,10 +24,10 @@ std::optional<Eigen::Vector3d> OnlyFixedCenter(const BundleProblem& problem) {
   return only;
 }
 
-// Images do not tell the scale: adjustments of whole maps from one fixed centre changed it by 0.1 to 3 %, and
-// one with eleven keyframes by 13 %. Scales the solution about this centre so that the distances of the
-// keyframes are as before in the least-squares sense. The positions of fewer than ten are poorly known: an
-// adjustment of two to four changed their distances by up to 18 %, while the points stayed.
+// Images do not determine the scale: adjustments of whole maps from one fixed centre changed it by 0.1 to 3
+// %, and one with eleven keyframes by 13 %. Scales the solution about this centre so that the distances of
+// the keyframes are as before in the least-squares sense. The positions of fewer than ten are poorly known:
+// an adjustment of two to four changed their distances by up to 18 %, while the points stayed.
 void KeepScale(Map* map, MapAssembly* assembly) {
   constexpr std::size_t kManyKeyframes = 10;
   BundleProblem& problem = assembly->problem;

@@ -24,7 +24,7 @@ struct ReadoutEstimationOptions {
   // prior_sigma_s. Then the measurements count kReadoutRateErrors squared times less.
   std::optional<ReadoutPrior> prior = std::nullopt;
   // Standard deviation of the errors that all images of one problem have in common, besides those. In a fast
-  // pan the newest keyframes told 17, 16, 14 and 12 ms instead of 18.5.
+  // pan the newest keyframes gave 17, 16, 14 and 12 ms instead of 18.5.
   double common_sigma_s = 0.004;
   // A readout time is used once it differs from zero by this many standard deviations and seconds. Errors of
   // a calibration looked like up to 3.5 ms in real recordings; this is twice that. A faster shutter counts as
@@ -34,7 +34,7 @@ struct ReadoutEstimationOptions {
   // From then on a change is followed if it is at least this and at least its standard deviation.
   double min_change_s = 0.001;
   double max_readout_s = 0.07;  // no camera takes longer
-  double min_rate = 0.1;        // radians per second; slower rotations tell nothing
+  double min_rate = 0.1;        // radians per second; slower rotations do not determine it
   int min_measurements = 200;   // in images that rotated
 
   // Describes the first invalid option in one sentence, or empty.
@@ -52,7 +52,7 @@ struct ReadoutEstimate {
 // cameras and all points of the problem: one Gauss-Newton step, with cameras and points eliminated (Triggs et
 // al., "Bundle Adjustment - A Modern Synthesis", 2000, section 6). A wrong readout time leaves residuals that
 // grow with the rotation rate and with the distance from the middle row, which no camera and no point
-// explains. Each camera keeps its rotation rate. Empty if too few measurements tell it. Deterministic.
+// explains. Each camera keeps its rotation rate. Empty if there are too few measurements. Deterministic.
 std::optional<ReadoutEstimate> EstimateReadout(const ReadoutEstimationOptions& options,
                                                const std::vector<char>& of_lens,
                                                const BundleProblem& problem);
