@@ -9,7 +9,7 @@ namespace docent::app {
 // did anything with it. One camera; one thread.
 class IdleWatch {
  public:
-  // The device counts as left after so long, in seconds.
+  // The device counts as left after this long, in seconds.
   explicit IdleWatch(double idle_s) : idle_s_(idle_s) {}
 
   // An image (CV_8UC1 or CV_8UC3, not empty) and its time in seconds, which does not decrease. Returns true

@@ -14,7 +14,7 @@ namespace docent::app {
 class LeftTour {
  public:
   struct Times {
-    double left = 300;   // A device counts as left after so long, seconds: longer than a rest on a bench.
+    double left = 300;   // A device counts as left after this long, seconds: longer than a rest on a bench.
     double answer = 20;  // How long an answer is waited for, seconds: enough to read the question twice.
   };
   // `asks`: false where nobody is asked, and a tour that was left begins anew at once.
@@ -24,7 +24,7 @@ class LeftTour {
   // visitor would take something over. Returns true when the tour is to begin anew.
   bool Update(double seconds, const cv::Mat& image, bool is_begun);
   // The visitor did something with the device, by touch or keys. Where the camera is fixed, its image does
-  // not tell.
+  // not show it.
   void Use() { idle_watch_.Use(); }
   // Whether the visitor is to be asked at present.
   bool is_asking() const { return asked_s_.has_value(); }

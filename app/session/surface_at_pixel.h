@@ -13,9 +13,9 @@ namespace docent::app {
 // Throws Error with one sentence when the frame has no pose.
 void RequirePose(const engine::TrackedFrame& frame);
 
-// The surface that the frame shows at a pixel: at the distance that the images of keyframes tell, else where
-// the map points around the pixel are. Throws Error with one sentence when the frame has no pose, the pixel
-// no ray, or the map no surface there.
+// The surface that the frame shows at a pixel: at the distance that is measured in the images of keyframes,
+// else where the map points around the pixel are. Throws Error with one sentence when the frame has no pose,
+// the lens does not see anything at the pixel, or the map has no surface there.
 content::SurfaceHit SurfaceAtPixel(const engine::TrackedFrame& frame, const engine::CameraModel& camera,
                                    const Eigen::Vector2d& pixel);
 // The same from the map points alone, for what needs the plane around the pixel and not the point itself, as

@@ -23,7 +23,7 @@ class SystemEventHandler {
   // Brings the session up to date with what happened in the system since the last call, in order, and adds
   // an event in words for what the user should know.
   void HandleEvents();
-  // Adds an event when the frame's camera found places that it could not decide between, and says why.
+  // Adds an event when a relocalization of the frame's camera was rejected, with the reason.
   void ReportRejection(const engine::TrackedFrame& frame);
 
  private:

@@ -15,10 +15,10 @@ namespace docent::app {
 
 // Times and lengths of cards. They are design choices, each for the reason given.
 struct CardTimes {
-  double dwell = 1.5;  // Looked at for this long, a thing opens: most glances are shorter.
+  double dwell = 1.5;  // Looked at for this long, an entity's card opens: most glances are shorter.
   double leave = 2;    // A card that was opened by gaze closes when one has looked elsewhere for this long.
-  // Pages turn by themselves for who has no hands: at 15 characters a second, which subtitles are limited to,
-  // and this long for the change.
+  // Pages turn by themselves for visitors without free hands: at 15 characters a second, which subtitles are
+  // limited to, and this long for the change.
   double characters_per_s = 15, turn = 2;
   double hint = 10;  // How cards are opened is said for this long in all, while something can be opened.
   std::size_t page_characters = 300;  // Fits at normal size on a display of 800x480 pixels.

@@ -34,7 +34,7 @@ void MapJoinRequests::Request(const KnownMap& into) {
   }
 }
 
-void MapJoinRequests::Ask(KnownMap* from, const KnownMap& into) {
+void MapJoinRequests::Request(KnownMap* from, const KnownMap& into) {
   from->join_with = into.key;
   from->join_at = 0;
   from->join_asked = true;

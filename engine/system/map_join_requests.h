@@ -24,7 +24,7 @@ class MapJoinRequests {
   // To be called whenever a map was entered or extended.
   void Request(const KnownMap& into);
   // A person asks for `from` to be joined into `into`. While another pair is being compared, this one waits.
-  void Ask(KnownMap* from, const KnownMap& into);
+  void Request(KnownMap* from, const KnownMap& into);
   enum class Answer { kAwaited, kOutdated, kChangedMeanwhile };
   // kChangedMeanwhile: one of the maps changed after the request, so that the mapper must continue with the
   // map as it was.

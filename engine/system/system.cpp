@@ -282,7 +282,7 @@ void System::JoinIntoActiveMap(std::uint64_t from) {
   const std::scoped_lock lock(mutex_);
   KnownMap* const other = state_.FindMap(from);
   const KnownMap* const into = state_.FindMap(state_.active_key);
-  if (other != nullptr && into != nullptr && other != into) policy_.joins().Ask(other, *into);
+  if (other != nullptr && into != nullptr && other != into) policy_.joins().Request(other, *into);
 }
 
 void System::RemoveMap(std::uint64_t key) {

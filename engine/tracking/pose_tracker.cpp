@@ -133,14 +133,14 @@ Rigid3 PoseTracker::PredictAfterLoss(const CameraImage& image) const {
   return rotation ? motion_.PredictWithRotation(image.time, *rotation) : motion_.Predict(image.time);
 }
 
-void PoseTracker::MissAt(Timestamp time, const Rigid3& camera_from_map) {
+void PoseTracker::ContinueFrom(Timestamp time, const Rigid3& camera_from_map) {
   map_tracker_.ForgetLastFrame();
   map_tracker_.SetPredictedCenter(std::nullopt);
   motion_.Reset(time, camera_from_map);
 }
 
 void PoseTracker::Follow(const PoseTracker& other, Timestamp time) {
-  MissAt(time, other.last());
+  ContinueFrom(time, other.last());
   position_ = other.position_;
 }
 

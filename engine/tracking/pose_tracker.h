@@ -67,7 +67,7 @@ class PoseTracker {
   // The last pose, moved on by the rotation of the images or else by the motion model.
   Rigid3 PredictAfterLoss(const CameraImage& image) const;
   // Predicts the next frame from this pose, although no pose was found there in this one.
-  void MissAt(Timestamp time, const Rigid3& camera_from_map);
+  void ContinueFrom(Timestamp time, const Rigid3& camera_from_map);
   // This tracker of the same camera has the pose of the present frame.
   void Follow(const PoseTracker& other, Timestamp time);
   // The attempts that follow use the predicted position where the points determine it poorly.

@@ -27,7 +27,7 @@ struct RelocalizationResult {
       RejectionReason::kNone;        // kNone: a pose was accepted, or there was no hypothesis
   std::uint64_t map_key = 0;         // the map of the hypothesis
   std::uint64_t competitor_key = 0;  // of kAmbiguous only; may be the same map
-  int inliers = 0;                   // points that agree
+  int inliers = 0;                   // of the hypothesis
   int frames = 0;                    // consecutive frames that agree so far, of kUnconfirmed
 
   // Keeps the result that came closer to acceptance.

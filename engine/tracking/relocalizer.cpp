@@ -79,7 +79,7 @@ Relocalizer::Attempt Relocalizer::SearchNearby(const PoseSearch& search, Tracked
   }
   out->relocalization.Consider(
       {.rejection = rejection, .map_key = search.map_key, .inliers = result.inliers});
-  search.pose->MissAt(search.image.time, guess);
+  search.pose->ContinueFrom(search.image.time, guess);
   return Attempt::kGoOn;
 }
 

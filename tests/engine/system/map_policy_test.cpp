@@ -278,7 +278,7 @@ TEST_F(PolicyForTwoCameras, KeepsAMapThatMayNotBeDiscardedWhenTheCameraIsFoundIn
 TEST_F(PolicyForTwoCameras, KeepsNoSnapshotOfAMapThatWasJoinedIntoAnother) {
   LoseMapWithAPoint(2);
   state_.AddMap(2).SetSnapshot(MapWithAPoint());
-  policy_.joins().Ask(&MapOf(2), MapOf(1));
+  policy_.joins().Request(&MapOf(2), MapOf(1));
   MapJoinAttempt attempt;
   attempt.joined = std::make_shared<const JoinedMap>();
   policy_.joins().Handle(attempt, &MapOf(1));
@@ -289,7 +289,7 @@ TEST_F(PolicyForTwoCameras, KeepsNoSnapshotOfAMapThatWasJoinedIntoAnother) {
 TEST_F(PolicyForTwoCameras, AnswersARequestToJoinAMapThatWasRemovedMeanwhile) {
   LoseMapWithAPoint(2);
   state_.AddMap(2).SetSnapshot(MapWithAPoint());
-  policy_.joins().Ask(&MapOf(2), MapOf(1));
+  policy_.joins().Request(&MapOf(2), MapOf(1));
   MapOf(2).Discard();
   policy_.joins().Handle(MapJoinAttempt(), &MapOf(1));
   EXPECT_TRUE(std::holds_alternative<JoinRefused>(state_.events.back().what));
