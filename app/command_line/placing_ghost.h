@@ -44,8 +44,8 @@ class PlacingGhost {
   // The name that the placed entity has until it gets its own; no entity can have it.
   static const char* name() { return "\n"; }
   // The scene with the entity that a click at this pixel would place; of a trail, the piece from trail_end to
-  // there. Where nothing can be placed, it is the
-  // scene itself and *note says why, unless the file is still being read.
+  // there. Where nothing can be placed, it is the scene itself and *note says why, unless the file is still
+  // being read.
   std::shared_ptr<const content::Scene> AddTo(const std::shared_ptr<const content::Scene>& scene,
                                               const AuthorView& view, const ui::AuthoringChoices& choices,
                                               const Eigen::Vector2d& pixel,
