@@ -188,7 +188,14 @@ void SystemEventHandler::Handle(const engine::SystemEvent& event, const engine::
 }
 
 void SystemEventHandler::Handle(const engine::SystemEvent& event, const engine::MapperFailed& what) {
-  const std::string text = "Mapping has stopped because of an error: " + what.what +
+  const std::string error = what.what + (what.what.ends_with('.') ? "" : ".");
+  if (!options_.may_write) {  // Visitors cannot help it.
+    state_.AddEvent(event.time, "warning",
+                    "Visual odometry beyond the maps has stopped because of an error: " + error +
+                        " Tracking in the maps continues.");
+    return;
+  }
+  const std::string text = "Mapping has stopped because of an error: " + error +
                            " Tracking continues, and what was mapped is saved.";
   state_.AddEvent(event.time, "warning", text);
   for (SessionCamera& camera : state_.cameras) camera.Advise(text);

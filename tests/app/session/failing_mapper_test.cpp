@@ -50,7 +50,9 @@ TEST(FailingMapper, IsReportedAtOnceAndTrackingContinues) {
               if (!warning.empty()) poses_after += engine::HasPose(frame.state);
             },
             {});
-  EXPECT_THAT(warning, HasSubstr("Mapping has stopped because of an error: the image store failed"));
+  EXPECT_THAT(
+      warning,
+      HasSubstr("Mapping has stopped because of an error: the image store failed. Tracking continues"));
   EXPECT_GT(poses_after, 10);
   EXPECT_THROW(session.Finish(), std::runtime_error);
 }
