@@ -92,9 +92,13 @@ void SessionSaving::Autosave(Timestamp time) {
   if (!saver_) return;
   // After a pause, in which time passed without images, their times go on where they were.
   if (!last_save_ || time < *last_save_) last_save_ = time;
-  if (options_.autosave_interval <= Timestamp{} || time - *last_save_ < options_.autosave_interval) return;
+  // Without automatic saving, a failed save is reported all the same.
+  constexpr Timestamp kReportInterval = std::chrono::seconds(10);
+  const bool saves = options_.autosave_interval > Timestamp{};
+  if (time - *last_save_ < (saves ? options_.autosave_interval : kReportInterval)) return;
   last_save_ = time;
   ReportFailure(time);
+  if (!saves) return;
   for (auto& [key, map] : state_.maps) {
     if (!system_.IsProvisional(key)) SaveMap(&map, time);
   }
@@ -149,8 +153,11 @@ SavingStatus SessionSaving::Status() const {
   status.unsaved = saver_->pending() > 0;
   const std::scoped_lock lock(mutex_);
   status.saved_at = saved_at_;
-  for (const auto& [key, map] : state_.maps)
-    status.unsaved = status.unsaved || (map.Exists() && map.NeedsSave() && map.snapshot->HasFinitePoints());
+  for (const auto& [key, map] : state_.maps) {
+    // A save that was submitted may have failed.
+    const bool needs_save = map.NeedsSave() && map.snapshot->HasFinitePoints();
+    status.unsaved = status.unsaved || (map.Exists() && (needs_save || submitted_.contains(key)));
+  }
   return status;
 }
 

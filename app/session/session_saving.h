@@ -48,7 +48,8 @@ class SessionSaving {
 
   void SaveMap(SessionMap* map, Timestamp time);
   void SaveAll(Timestamp time);
-  // Saves all maps that are not provisional if the interval of the options has passed.
+  // Saves all maps that are not provisional if the interval of the options has passed. Before that, and now
+  // and then if the options have none, it reports a save that failed.
   void Autosave(Timestamp time);
   // A failed save becomes a warning, and everything that it may not have written is saved again.
   void ReportFailure(Timestamp time);

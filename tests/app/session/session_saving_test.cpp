@@ -55,7 +55,7 @@ class SavingSession : public ::testing::Test {
   const TemporaryFolder folder_;
   maps::Library library_ =
       OpenLibrary(folder_ / "l.docent", maps::Access::kReadWrite, maps::CreateIfMissing::kYes);
-  const SessionOptions options_ = simulated_session::Options(Pace::kLockstep, "");
+  SessionOptions options_ = simulated_session::Options(Pace::kLockstep, "");
   const std::vector<std::shared_ptr<const engine::CameraModel>> cameras_ =
       simulated_session::LensOf(*simulated_session::Room(1));
   engine::System system_{options_, cameras_};
@@ -85,6 +85,32 @@ TEST_F(SavingSession, WhoQuitsWithoutSavingHasLostNothing) {
   Save();
   saving_.DiscardChanges();
   EXPECT_EQ(saving_.DescribeUnsaved(), "");
+}
+
+TEST_F(SavingSession, WhatCouldNotBeWrittenStaysUnsaved) {
+  constexpr std::uint64_t kForeignKey = 1'000'000;  // The library refuses it.
+  state_.AddMap(kForeignKey, "Attic").snapshot =
+      maps::MakeSampleMap(kForeignKey, {.keyframes = 2, .points = 10});
+  Save();
+  EXPECT_THAT(Stored(), ElementsAre("Hall", "Yard"));
+  EXPECT_TRUE(saving_.Status().unsaved);
+  state_.FindByName("Attic")->Discard();
+  EXPECT_FALSE(saving_.Status().unsaved);
+}
+
+TEST_F(SavingSession, AFailedSaveIsReportedWithoutAutomaticSavingToo) {
+  options_.autosave_interval = {};
+  constexpr std::uint64_t kForeignKey = 1'000'000;
+  state_.AddMap(kForeignKey, "Attic").snapshot =
+      maps::MakeSampleMap(kForeignKey, {.keyframes = 2, .points = 10});
+  Save();
+  {
+    const std::scoped_lock lock(mutex_);
+    saving_.Autosave(std::chrono::seconds(1));
+    saving_.Autosave(std::chrono::seconds(20));
+  }
+  EXPECT_THAT(Warnings(), ElementsAre(HasSubstr("map 'Attic' cannot be saved: ")));
+  EXPECT_TRUE(saving_.Status().unsaved);
 }
 
 }  // namespace
