@@ -113,6 +113,8 @@ void AuthorControls::KeepContent() {
   if (!view_.frame) return;
   if (view_.frame->tracked.map_key == 0) {
     if (leaves_map_ || !view_.frame->shown.starting_map.empty()) content_.reset();
+    // The content goes on changing: commands that need no pose are for this map.
+    if (auto scene = content_ ? host_.scene_of(scene_map_) : nullptr) content_ = std::move(scene);
     return;
   }
   // A frozen frame keeps the name that the map had before it was renamed (see Take).

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <chrono>
+#include <cstdint>
 #include <functional>
 #include <memory>
 #include <optional>
@@ -37,7 +38,9 @@ class AuthorControls final : public CommandActions {
     std::function<void(Command)> emit;
     std::function<void()> toggle_full_screen, swap_cameras;
     std::function<void()> toggle_pause;  // Of recordings.
-    std::string language;                // Of the texts that are shown.
+    // See WindowLink::scene_of.
+    std::function<std::shared_ptr<const content::Scene>(std::uint64_t map_key)> scene_of;
+    std::string language;  // Of the texts that are shown.
   };
 
   AuthorControls(ui::Window* window, Host host, std::filesystem::path model_folder);
@@ -136,9 +139,8 @@ class AuthorControls final : public CommandActions {
   std::uint64_t scene_map_ = 0;                     // The map whose entities are selected.
   std::string map_name_;                            // Its name.
   std::pair<std::uint64_t, std::string> seen_map_;  // Key and name in the last frame with a map.
-  // What the panel shows of that map, as it was seen last, so that what is being written there is not lost
-  // with the camera. The content is null before it was seen, and while a lost camera is meant to leave the
-  // map.
+  // What the panel shows of that map, so that what is being written there is not lost with the camera. The
+  // content is null before it was seen, and while a lost camera is meant to leave the map.
   std::shared_ptr<const content::Scene> content_;
   engine::Rotation3 map_from_upright_;
   engine::Rigid3 camera_from_map_;

@@ -51,6 +51,10 @@ class GuideRun {
   NoticeQueue* notices() { return &notices_; }
   SavingState Saving() const;
   std::vector<ui::MapFacts> MapsForWindow() const;  // by name
+  // See Session::SceneOf.
+  std::shared_ptr<const content::Scene> SceneOf(std::uint64_t map_key) const {
+    return session_.SceneOf(map_key);
+  }
   void DiscardChanges() { session_.DiscardChanges(); }
   // Pauses recordings that are played for an author, or lets them go on.
   void TogglePause();

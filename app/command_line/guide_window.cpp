@@ -46,6 +46,7 @@ class GuideWindow {
     host.toggle_full_screen = [this] { window_.ToggleFullScreen(); };
     host.swap_cameras = [this] { Swap(); };
     host.toggle_pause = [this] { link_.toggle_pause(); };
+    host.scene_of = [this](std::uint64_t map_key) { return link_.scene_of(map_key); };
     controls_.emplace(&window_, std::move(host), request.model_folder);
   }
 
@@ -127,13 +128,13 @@ class GuideWindow {
     return fresh;
   }
 
-  // The content of the shown frame; with a frozen view that of the newest frame in the same map.
+  // The content of the shown frame; with a frozen view the one that its map has now, wherever the camera is.
   std::shared_ptr<const content::Scene> SceneOfLarge() {
-    const auto& newest = newest_[large_];
-    if (newest && newest->shown.scene && newest->tracked.map_key == large()->tracked.map_key)
-      newer_scene_ = {newest->tracked.map_key, newest->shown.scene};
-    const bool has_newer = newer_scene_.first == large()->tracked.map_key && newer_scene_.second;
-    return is_frozen() && has_newer ? newer_scene_.second : large()->shown.scene;
+    if (!is_frozen()) return large()->shown.scene;
+    const std::uint64_t map = large()->tracked.map_key;
+    if (auto scene = link_.scene_of(map)) newer_scene_ = {map, std::move(scene)};
+    const bool has_newer = newer_scene_.first == map && newer_scene_.second;
+    return has_newer ? newer_scene_.second : large()->shown.scene;
   }
 
   void MakeVisitorControls() {

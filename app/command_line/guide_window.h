@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <cstdint>
 #include <functional>
 #include <memory>
 #include <span>
@@ -12,6 +13,7 @@
 #include "app/command_line/run_guide.h"
 #include "app/evaluation/camera_report.h"
 #include "app/script/commands.h"
+#include "content/scene.h"
 #include "ui/authoring_actions.h"
 
 namespace docent::app {
@@ -22,6 +24,8 @@ struct WindowLink {
   NoticeQueue* notices = nullptr;   // Never null.
   std::function<SavingState()> saving;
   std::function<std::vector<ui::MapFacts>()> maps;
+  // The content of a map as it is now, also while no camera is tracked in it; null if it is not in memory.
+  std::function<std::shared_ptr<const content::Scene>(std::uint64_t map_key)> scene_of;
   // From now on nothing is saved.
   std::function<void()> discard_changes;
   // Pauses recordings, or lets them go on.

@@ -108,6 +108,7 @@ void RunWindowed(const GuideRequest& request, std::span<CalibratedCamera> camera
     link.notices = run->notices();
     link.saving = [run] { return run->Saving(); };
     link.maps = [run] { return run->MapsForWindow(); };
+    link.scene_of = [run](std::uint64_t map_key) { return run->SceneOf(map_key); };
     link.discard_changes = [run] { run->DiscardChanges(); };
     link.toggle_pause = [run] { run->TogglePause(); };
     link.toggle_fast_forward = [run] { run->ToggleFastForward(); };

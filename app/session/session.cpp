@@ -173,6 +173,13 @@ Session::Shown Session::ShownWith(const engine::TrackedFrame& frame) const {
   return shown;
 }
 
+std::shared_ptr<const content::Scene> Session::SceneOf(std::uint64_t map_key) const {
+  const std::scoped_lock lock(mutex_);
+  const auto found = state_.maps.find(map_key);
+  if (found == state_.maps.end() || !found->second.Exists() || !found->second.snapshot) return nullptr;
+  return found->second.scene;
+}
+
 std::vector<Session::SimilarView> Session::SimilarViews(const engine::Frame& frame, std::size_t count,
                                                         bool entrances) {
   cv::Mat gray = frame.image;

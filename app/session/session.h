@@ -100,6 +100,9 @@ class Session {
     std::string starting_map;  // the map that is being initialized; empty once it has points, and for none
   };
   Shown ShownWith(const engine::TrackedFrame& frame) const;
+  // The content of a map in memory as it is now, also while no camera is tracked in it; null if the map is
+  // not in memory or exists no longer.
+  std::shared_ptr<const content::Scene> SceneOf(std::uint64_t map_key) const;
   // A keyframe that resembles an image, for a visitor who is looking for a place.
   struct SimilarView {
     std::string map_name;

@@ -31,6 +31,7 @@ class AuthorAtControls : public ::testing::Test {
     window_.emplace("Docent", 1280, 1000);
     AuthorControls::Host host;
     host.emit = [this](Command command) { commands_.push_back(std::move(command)); };
+    host.scene_of = [this](std::uint64_t) { return scene_; };
     controls_.emplace(&*window_, std::move(host), folder_.path());
     Draw(5);
   }
@@ -160,6 +161,17 @@ TEST_F(AuthorAtControls, NothingIsWrittenToAMapThatWasRenamedAndRemovedWhileTheV
   Draw(3);
   PressReturn();
   EXPECT_THAT(commands_, IsEmpty());
+}
+
+TEST_F(AuthorAtControls, ChangesWhileTheCameraIsLostAreKnownToTheNextOne) {
+  is_in_map_ = false;
+  Draw(1);
+  content::Scene scene = *scene_;
+  scene.entities[0].group = "group-1";
+  scene_ = std::make_shared<const content::Scene>(std::move(scene));
+  Draw(1);
+  controls_->Group({"sign-2"});
+  EXPECT_THAT(commands_, ElementsAre(Command(GroupEntities{{"sign-2"}, "group-2"})));
 }
 
 TEST_F(AuthorAtControls, WhatIsCopiedWhileTheCameraIsLostIsPasted) {

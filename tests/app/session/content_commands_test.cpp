@@ -397,6 +397,21 @@ TEST_F(ContentInASession, MapsAreRenamedAndRemovedWithTheSignpostsThatLeadToThem
   EXPECT_THAT(library_.Verify(), IsEmpty());
 }
 
+TEST_F(ContentInASession, ChangesWithALostCameraAreInTheContentOfItsMap) {
+  Run([&] {
+    ASSERT_EQ(Do(PlaceSignpost{"here", kPixel, ""}), "");
+    engine::TrackedFrame lost = frame_;
+    lost.state = engine::TrackingState::kLost;
+    lost.map_key = 0;
+    lost.map.reset();
+    session_->Execute(RenameEntity{"sign-1", "Cove"}, lost);
+    EXPECT_EQ(session_->ShownWith(lost).scene, nullptr);
+    ASSERT_NE(session_->SceneOf(frame_.map_key), nullptr);
+    EXPECT_NE(session_->SceneOf(frame_.map_key)->Find("Cove"), nullptr);
+    EXPECT_EQ(session_->SceneOf(0), nullptr);
+  });
+}
+
 TEST_F(ContentInASession, TheBoundaryOfABoundedMapIsShown) {
   Run([&] {
     EXPECT_FALSE(session_->ShownWith(frame_).bounds.has_value());
