@@ -24,10 +24,28 @@ std::string LastProblem() {
   return description == nullptr ? std::string("unknown reason") : std::string(description);
 }
 
-// Returns an empty name for keys that Docent does not use.
-std::string NameOf(int key) {
-  if (key >= GLFW_KEY_A && key <= GLFW_KEY_Z)
-    return std::string(1, static_cast<char>('a' + key - GLFW_KEY_A));
+bool IsLetter(const std::string& text) {
+  return text.size() == 1 && text[0] >= 'a' && text[0] <= 'z';
+}
+
+bool IsAscii(const std::string& text) {
+  return std::ranges::all_of(text, [](char c) { return static_cast<unsigned char>(c) < 0x80; });
+}
+
+}  // namespace
+
+// GLFW names keys by their places on a US keyboard. The row of digits is taken so: some layouts write its
+// digits with Shift only.
+std::string KeyName(int key, const std::string& written) {
+  if (IsLetter(written)) return written;
+  if (key >= GLFW_KEY_A && key <= GLFW_KEY_Z) {
+    // Where the layout has other letters, as a Russian one, the place says which one is meant.
+    if (written.empty() || !IsAscii(written))
+      return std::string(1, static_cast<char>('a' + key - GLFW_KEY_A));
+    return "";
+  }
+  if (key >= GLFW_KEY_KP_0 && key <= GLFW_KEY_KP_9)
+    return std::string(1, static_cast<char>('0' + key - GLFW_KEY_KP_0));
   if (key >= GLFW_KEY_0 && key <= GLFW_KEY_9)
     return std::string(1, static_cast<char>('0' + key - GLFW_KEY_0));
   if (key >= GLFW_KEY_F1 && key <= GLFW_KEY_F12) return "f" + std::to_string(1 + key - GLFW_KEY_F1);
@@ -37,6 +55,7 @@ std::string NameOf(int key) {
     case GLFW_KEY_SPACE:
       return "space";
     case GLFW_KEY_ENTER:
+    case GLFW_KEY_KP_ENTER:
       return "enter";
     case GLFW_KEY_TAB:
       return "tab";
@@ -57,8 +76,6 @@ std::string NameOf(int key) {
   }
 }
 
-}  // namespace
-
 struct Window::Impl {
   GLFWwindow* window = nullptr;
   std::vector<InputEvent> events;
@@ -76,10 +93,12 @@ struct Window::Impl {
     event.shift = (modifiers & GLFW_MOD_SHIFT) != 0;
     Of(window).events.push_back(std::move(event));
   }
-  static void OnKey(GLFWwindow* window, int key, int, int action, int modifiers) {
+  static void OnKey(GLFWwindow* window, int key, int scancode, int action, int modifiers) {
     InputEvent event;
     if (action == GLFW_RELEASE) event.kind = InputEvent::Kind::kKeyUp;
-    event.key = NameOf(key);
+    if (key == GLFW_KEY_UNKNOWN) return;
+    const char* const written = glfwGetKeyName(key, scancode);
+    event.key = KeyName(key, written == nullptr ? "" : written);
     event.repeated = action == GLFW_REPEAT;
     event.control = (modifiers & GLFW_MOD_CONTROL) != 0;
     event.shift = (modifiers & GLFW_MOD_SHIFT) != 0;

@@ -18,13 +18,19 @@ struct InputEvent {
   // kClick, kRelease, kDrop: where the button was pressed or released, or the files were dropped.
   Eigen::Vector2d position = Eigen::Vector2d::Zero();
   int button = 0;  // kClick, kRelease: 0 left, 1 right, 2 middle
-  // kKey, kKeyUp: "a" … "z", "0" … "9", "escape", "space", "enter", "tab", "f1" … "f12", "left", "up" …
+  // kKey, kKeyUp: "a" … "z", "0" … "9", "escape", "space", "enter", "tab", "f1" … "f12", "left", "up" …; see
+  // KeyName
   std::string key;
   bool control = false, shift = false;  // kKey, kClick
   bool repeated = false;                // kKey: the key is held
   std::vector<std::string> files;       // kDrop: paths
   int width_px = 0, height_px = 0;      // kResize: the size of the framebuffer
 };
+
+// The name that InputEvent::key has for a key of GLFW; empty for keys that Docent does not use. `written`:
+// what the key writes in the user's layout without Shift (UTF-8); empty where it writes nothing. A letter is
+// the one that is written, so that Ctrl-Z is where the user reads Z.
+std::string KeyName(int key, const std::string& written);
 
 // A window with an OpenGL 3.3 core context (GLFW). It may only be used on the thread that constructed it,
 // which must be the program's main thread (a rule of GLFW).

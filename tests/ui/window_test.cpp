@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "ui/window.h"
 
+#define GLFW_INCLUDE_NONE
+#include <GLFW/glfw3.h>
 #include <gmock/gmock.h>
 
 #include <cstdlib>
@@ -29,6 +31,27 @@ TEST(Window, ThrowsAClearErrorWithoutADisplay) {
   } catch (const Error& error) {
     EXPECT_NE(std::string(error.what()).find("no display"), std::string::npos) << error.what();
   }
+}
+
+TEST(KeyName, IsTheLetterThatTheLayoutWrites) {
+  EXPECT_EQ(KeyName(GLFW_KEY_Z, "z"), "z");
+  EXPECT_EQ(KeyName(GLFW_KEY_Y, "z"), "z") << "German";
+  EXPECT_EQ(KeyName(GLFW_KEY_Q, "a"), "a") << "French";
+  EXPECT_EQ(KeyName(GLFW_KEY_SEMICOLON, "m"), "m") << "French";
+  EXPECT_EQ(KeyName(GLFW_KEY_M, ","), "") << "French";
+  EXPECT_EQ(KeyName(GLFW_KEY_Z, "я"), "z") << "Russian";
+  EXPECT_EQ(KeyName(GLFW_KEY_SEMICOLON, ";"), "");
+}
+
+TEST(KeyName, IsTheDigitInEveryLayoutAndOnTheKeypad) {
+  EXPECT_EQ(KeyName(GLFW_KEY_1, "1"), "1");
+  EXPECT_EQ(KeyName(GLFW_KEY_1, "&"), "1") << "French";
+  EXPECT_EQ(KeyName(GLFW_KEY_2, "ě"), "2") << "Czech";
+  EXPECT_EQ(KeyName(GLFW_KEY_KP_0, "0"), "0");
+  EXPECT_EQ(KeyName(GLFW_KEY_KP_9, "9"), "9");
+  EXPECT_EQ(KeyName(GLFW_KEY_KP_ENTER, ""), "enter");
+  EXPECT_EQ(KeyName(GLFW_KEY_ENTER, ""), "enter");
+  EXPECT_EQ(KeyName(GLFW_KEY_F11, ""), "f11");
 }
 
 // An author's interface on a virtual screen, with a person at it.
