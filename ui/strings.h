@@ -46,6 +46,8 @@ inline constexpr const char* kLength = "Length (m)";
 inline constexpr const char* kMeasure = "Measure it…";
 inline constexpr const char* kClickFirstPoint = "Click on its first end in the image. Escape cancels.";
 inline constexpr const char* kClickSecondPoint = "Click on its other end.";
+inline constexpr const char* kMeasureEnded =
+    "The view changed before the other end was shown, so nothing was measured.";
 inline constexpr const char* kForgetScale = "Forget the scale";
 inline constexpr const char* kEntranceFirst = "Visitors who look for this place are shown its first view.";
 inline constexpr const char* kEntranceChosen =

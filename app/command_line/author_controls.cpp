@@ -91,6 +91,7 @@ void AuthorControls::SetView(AuthorView view, const SavingState& saving, std::ve
   view_ = std::move(view);
   saving_ = saving;
   maps_ = std::move(maps);
+  EndMeasuringInAnotherImage();
   const std::uint64_t map = view_.frame ? view_.frame->tracked.map_key : 0;
   // Of a lost camera, the selection waits until it is back in the map.
   if (map != 0 && std::exchange(scene_map_, map) != map) {
@@ -517,6 +518,8 @@ void AuthorControls::HandlePick(const Eigen::Vector2d& pixel) {
       return Emit(SetMapUp{pixel});
     case ui::MapPick::kMeasureFrom:
       measured_from_ = pixel;
+      measured_in_ = view_.frame;
+      choices.frozen = true;
       choices.pick = ui::MapPick::kMeasureTo;
       return;
     case ui::MapPick::kMeasureTo:
@@ -524,6 +527,14 @@ void AuthorControls::HandlePick(const Eigen::Vector2d& pixel) {
       choices.frozen = false;
       return;
   }
+}
+
+void AuthorControls::EndMeasuringInAnotherImage() {
+  ui::AuthoringChoices& choices = panel_.choices();
+  if (choices.pick != ui::MapPick::kMeasureTo || view_.frame == measured_in_) return;
+  choices.pick = ui::MapPick::kNone;
+  choices.frozen = false;
+  board_.AddDone(ui::strings::kMeasureEnded, false, Now());
 }
 
 }  // namespace docent::app

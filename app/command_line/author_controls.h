@@ -65,6 +65,7 @@ class AuthorControls final : public CommandActions {
   void AskToQuit();
   Ending ending() const { return ending_; }
   const ui::AuthoringChoices& choices() const { return panel_.choices(); }
+  ui::AuthoringChoices& choices() { return panel_.choices(); }
 
   // The actions that depend on the selection and the window.
   void Quit(bool save) override;
@@ -93,6 +94,8 @@ class AuthorControls final : public CommandActions {
   void HandleClick(const ui::InputEvent& event);
   void HandleDrop(const ui::InputEvent& event);
   void HandlePick(const Eigen::Vector2d& pixel);
+  // Ends the measuring of a length when its first end was shown in another image.
+  void EndMeasuringInAnotherImage();
   void Place(const ui::AuthoringChoices& choices, const Eigen::Vector2d& pixel);
   std::string SelectedTrail() const;
   std::optional<Eigen::Vector3d> TrailEnd() const;
@@ -131,6 +134,7 @@ class AuthorControls final : public CommandActions {
   bool preview_changed_ = false;
   std::string ghost_note_;                                   // Why nothing can be placed under the pointer.
   Eigen::Vector2d measured_from_ = Eigen::Vector2d::Zero();  // Pixel of the first end; see ui::MapPick.
+  std::shared_ptr<const ShownFrame> measured_in_;            // Its image.
   // What was copied, and the map that it is in.
   std::vector<std::string> copied_names_;
   std::string copied_from_;

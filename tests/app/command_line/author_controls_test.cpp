@@ -49,8 +49,16 @@ class AuthorAtControls : public ::testing::Test {
       window_->Show();
     }
   }
-  AuthorView Seen(const ui::WindowLayout& layout) const {
+  AuthorView Seen(const ui::WindowLayout& layout) {
     AuthorView view;
+    view.image = layout.image;
+    view.box = ui::FitImage(640, 480, layout.image);
+    view.camera.lens = lens_;
+    if (controls_->choices().frozen && shown_) {
+      view.frame = shown_;
+      view.scene = scene_;
+      return view;
+    }
     auto frame = std::make_shared<ShownFrame>();
     frame->tracked.state = engine::TrackingState::kLost;
     if (is_in_map_) {
@@ -58,10 +66,19 @@ class AuthorAtControls : public ::testing::Test {
       frame->shown.map_name = "Hall";
       view.scene = frame->shown.scene = scene_;
     }
-    view.frame = std::move(frame);
-    view.image = layout.image;
-    view.box = ui::FitImage(640, 480, layout.image);
+    view.frame = shown_ = std::move(frame);
     return view;
+  }
+  void SetLens() {
+    lens_ = engine::CameraModel(engine::LensModel::kRadialTangential, {640, 480, 500, 500, 320, 240}, {});
+  }
+  void ClickPixel(const Eigen::Vector2d& pixel) {
+    const Eigen::Vector2i size = window_->WindowSize();
+    const ui::WindowLayout layout = ui::LayOutWindow(size.x(), size.y(), 1, controls_->choices().panel_open);
+    ui::InputEvent click;
+    click.kind = ui::InputEvent::Kind::kClick;
+    click.position = ui::FitImage(640, 480, layout.image).WindowFromImage(pixel);
+    controls_->Handle(click);
   }
 
   void BeginName() {
@@ -91,6 +108,8 @@ class AuthorAtControls : public ::testing::Test {
   std::optional<ui::Window> window_;
   std::optional<AuthorControls> controls_;
   SavingState saving_;
+  std::shared_ptr<const ShownFrame> shown_;
+  engine::CameraModel lens_;  // Until it is set, no point of the window is in the image.
   bool is_in_map_ = true;
   PersonAtWindow person_{[this] { Draw(1); }};
 };
@@ -229,6 +248,33 @@ TEST_F(AuthorAtControls, QuittingAsksNothingWhereNothingWasWritten) {
   person_.Press("ctrl+q");
   EXPECT_THAT(commands_, IsEmpty());
   EXPECT_EQ(controls_->ending(), AuthorControls::Ending::kSave);
+}
+
+TEST_F(AuthorAtControls, ALengthIsMeasuredInOneImage) {
+  SetLens();
+  controls_->choices().pick = ui::MapPick::kMeasureFrom;
+  Draw(2);
+  ClickPixel({200, 240});
+  EXPECT_TRUE(controls_->choices().frozen);
+  Draw(2);
+  EXPECT_EQ(controls_->choices().pick, ui::MapPick::kMeasureTo);
+  ClickPixel({400, 240});
+  ASSERT_EQ(commands_.size(), 1u);
+  EXPECT_TRUE(std::holds_alternative<SetMapScale>(commands_[0]));
+  EXPECT_FALSE(controls_->choices().frozen);
+}
+
+TEST_F(AuthorAtControls, MeasuringEndsWhenAnotherImageIsShownBetweenBothClicks) {
+  SetLens();
+  controls_->choices().pick = ui::MapPick::kMeasureFrom;
+  Draw(2);
+  ClickPixel({200, 240});
+  Draw(2);
+  controls_->choices().frozen = false;
+  Draw(2);
+  EXPECT_EQ(controls_->choices().pick, ui::MapPick::kNone);
+  ClickPixel({400, 240});
+  EXPECT_THAT(commands_, IsEmpty());
 }
 
 }  // namespace
