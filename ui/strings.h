@@ -145,6 +145,8 @@ inline constexpr const char* kChooseFile = "Choose a model file first.";
 inline constexpr const char* kNoModelFile =
     " cannot be placed: it is not a model, image or sound file.";  // After the file's name.
 inline constexpr const char* kDropOnImage = "Drop files onto the image to place them there.";
+inline constexpr const char* kDropOnMap =
+    "Files are placed in the image, not in the map from above. Press M to see the image.";
 inline constexpr const char* kNoSurface = "No surface is known here.";
 
 // Contents section.

@@ -285,6 +285,7 @@ void AuthorControls::Place(const ui::AuthoringChoices& choices, const Eigen::Vec
 // The files are placed beside each other, in a row from the place where they were dropped.
 void AuthorControls::HandleDrop(const ui::InputEvent& event) {
   constexpr double kStep = 60;  // Window units at a scale of 1.
+  if (panel_.choices().from_above) return board_.AddError(ui::strings::kDropOnMap);
   Eigen::Vector2d point = event.position;
   for (const std::string& file : event.files) {
     ui::AuthoringChoices choices = panel_.choices();
@@ -486,13 +487,14 @@ void AuthorControls::CopySelected() {
   copied_from_ = map_name_;
 }
 
-// At the pointer, if it is over the image.
+// At the pointer, if it is over the image, else in the middle of the image.
 void AuthorControls::Paste() {
   if (copied_names_.empty()) return;
   RememberNames();
   PasteEntities command{copied_names_, copied_from_, std::nullopt};
   const Eigen::Vector2d point = window_->PointerPosition();
-  if (!gui_.WantsMouse() && view_.ShowsImageAt(point)) command.to_pixel = view_.PixelAt(point);
+  if (!panel_.choices().from_above && !gui_.WantsMouse() && view_.ShowsImageAt(point))
+    command.to_pixel = view_.PixelAt(point);
   Emit(std::move(command));
 }
 

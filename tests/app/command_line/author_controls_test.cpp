@@ -277,5 +277,26 @@ TEST_F(AuthorAtControls, MeasuringEndsWhenAnotherImageIsShownBetweenBothClicks) 
   EXPECT_THAT(commands_, IsEmpty());
 }
 
+TEST_F(AuthorAtControls, NothingIsPlacedAtAPixelThatTheMapFromAboveHides) {
+  SetLens();
+  controls_->Select("sign-1", false);
+  Draw(1);
+  controls_->CopySelected();
+  ui::InputEvent drop;
+  drop.kind = ui::InputEvent::Kind::kDrop;
+  drop.position = {300, 400};
+  drop.files = {"fox.glb"};
+  controls_->choices().from_above = true;
+  Draw(1);
+  controls_->Handle(drop);
+  EXPECT_THAT(commands_, IsEmpty());
+  controls_->Paste();
+  EXPECT_THAT(commands_, ElementsAre(Command(PasteEntities{{"sign-1"}, "Hall", std::nullopt})));
+  controls_->choices().from_above = false;
+  Draw(1);
+  controls_->Handle(drop);
+  EXPECT_EQ(commands_.size(), 2u);
+}
+
 }  // namespace
 }  // namespace docent::app
