@@ -37,6 +37,10 @@ void MessageBoard::AddDone(const std::string& text, bool offers_undo, double now
   messages_.push_back(std::move(message));
 }
 
+void MessageBoard::WithdrawUndo() {
+  for (Message& message : messages_) message.offers_undo = false;
+}
+
 void MessageBoard::Dismiss(std::uint64_t id) {
   std::erase_if(messages_, [&](const Message& message) { return message.id == id; });
 }

@@ -31,6 +31,8 @@ class MessageBoard {
   void AddError(const std::string& text);
   // A newer one replaces the older ones: only the last change can be undone.
   void AddDone(const std::string& text, bool offers_undo, double now_s);
+  // What was done was done in another map, so that undoing would undo something else.
+  void WithdrawUndo();
   void Dismiss(std::uint64_t id);
   void DismissAll() { messages_.clear(); }
   // Removes what has been shown long enough: five seconds, and eight with an Undo button.

@@ -95,6 +95,7 @@ void AuthorControls::SetView(AuthorView view, const SavingState& saving, std::ve
   const std::uint64_t map = view_.frame ? view_.frame->tracked.map_key : 0;
   // Of a lost camera, the selection waits until it is back in the map.
   if (map != 0 && std::exchange(scene_map_, map) != map) {
+    board_.WithdrawUndo();
     selection_.Clear();
     pointer_.Cancel();
     placing_.Cancel();
@@ -113,7 +114,10 @@ void AuthorControls::SetView(AuthorView view, const SavingState& saving, std::ve
 void AuthorControls::KeepContent() {
   if (!view_.frame) return;
   if (view_.frame->tracked.map_key == 0) {
-    if (leaves_map_ || !view_.frame->shown.starting_map.empty()) content_.reset();
+    if (leaves_map_ || !view_.frame->shown.starting_map.empty()) {
+      content_.reset();
+      board_.WithdrawUndo();
+    }
     // The content goes on changing: commands that need no pose are for this map.
     if (auto scene = content_ ? host_.scene_of(scene_map_) : nullptr) content_ = std::move(scene);
     return;

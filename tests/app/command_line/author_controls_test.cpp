@@ -62,7 +62,7 @@ class AuthorAtControls : public ::testing::Test {
     auto frame = std::make_shared<ShownFrame>();
     frame->tracked.state = engine::TrackingState::kLost;
     if (is_in_map_) {
-      frame->tracked.map_key = 7;
+      frame->tracked.map_key = map_key_;
       frame->shown.map_name = "Hall";
       view.scene = frame->shown.scene = scene_;
     }
@@ -71,6 +71,13 @@ class AuthorAtControls : public ::testing::Test {
   }
   void SetLens() {
     lens_ = engine::CameraModel(engine::LensModel::kRadialTangential, {640, 480, 500, 500, 320, 240}, {});
+  }
+  // The Undo button of the only message, at its right end.
+  void ClickUndo() {
+    const Eigen::Vector2i size = window_->WindowSize();
+    const ui::Area image = ui::LayOutWindow(size.x(), size.y(), 1, controls_->choices().panel_open).image;
+    const double right = 0.5 * image.width + std::min(280.0, 0.5 * image.width - 12);
+    person_.Click({right - 25, image.bottom() - 12 - 14});
   }
   void ClickPixel(const Eigen::Vector2d& pixel) {
     const Eigen::Vector2i size = window_->WindowSize();
@@ -111,6 +118,7 @@ class AuthorAtControls : public ::testing::Test {
   std::shared_ptr<const ShownFrame> shown_;
   engine::CameraModel lens_;  // Until it is set, no point of the window is in the image.
   bool is_in_map_ = true;
+  std::uint64_t map_key_ = 7;
   PersonAtWindow person_{[this] { Draw(1); }};
 };
 
@@ -296,6 +304,22 @@ TEST_F(AuthorAtControls, NothingIsPlacedAtAPixelThatTheMapFromAboveHides) {
   Draw(1);
   controls_->Handle(drop);
   EXPECT_EQ(commands_.size(), 2u);
+}
+
+TEST_F(AuthorAtControls, WhatWasDoneIsUndoneByTheButtonOfItsMessage) {
+  controls_->Take({Notice{"", RenameEntity{"sign-1", "Cove"}}});
+  Draw(3);
+  ClickUndo();
+  EXPECT_THAT(commands_, ElementsAre(Command(Undo{})));
+}
+
+TEST_F(AuthorAtControls, TheButtonOfAMessageUndoesNothingOfAnotherMap) {
+  controls_->Take({Notice{"", RenameEntity{"sign-1", "Cove"}}});
+  Draw(3);
+  map_key_ = 8;
+  Draw(3);
+  ClickUndo();
+  EXPECT_THAT(commands_, IsEmpty());
 }
 
 }  // namespace
