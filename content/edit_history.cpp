@@ -160,6 +160,20 @@ bool EditHistory::RetargetSignposts(const std::function<bool(Signpost*)>& retarg
   return any;
 }
 
+std::set<std::string> EditHistory::Names() const {
+  std::set<std::string> names;
+  for (const auto* changes : {&done_, &undone_}) {
+    for (const SceneChange& change : *changes) {
+      for (const EntityChange& entity : change.entities) {
+        for (const auto* state : {&entity.before, &entity.after}) {
+          if (*state) names.insert((*state)->name);
+        }
+      }
+    }
+  }
+  return names;
+}
+
 std::vector<std::shared_ptr<const Asset>> EditHistory::Assets() const {
   std::map<std::string, std::shared_ptr<const Asset>> by_id;
   for (const auto* changes : {&done_, &undone_}) {

@@ -5,6 +5,7 @@
 #include <functional>
 #include <memory>
 #include <optional>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -78,6 +79,8 @@ class EditHistory {
 
   const std::vector<SceneChange>& done() const { return done_; }
   const std::vector<SceneChange>& undone() const { return undone_; }
+  // The names that entities have in the changes. Undo and redo may need each of them again.
+  std::set<std::string> Names() const;
   // All assets that the changes need, each once, in the order of their ids.
   std::vector<std::shared_ptr<const Asset>> Assets() const;
 

@@ -24,6 +24,14 @@ bool HasGroup(const content::Scene& scene, const std::string& group) {
                              [&](const content::Entity& entity) { return entity.group == group; });
 }
 
+std::string FreeName(const content::Scene& scene, const std::set<std::string>& taken,
+                     const std::string& base) {
+  std::string name = base;
+  for (int number = 2; scene.Find(name) != nullptr || taken.contains(name); ++number)
+    name = base + "-" + std::to_string(number);
+  return name;
+}
+
 // New names for the groups of B that A has too, by their old ones. What was not grouped together stays apart.
 std::map<std::string, std::string> FreeGroups(const content::Scene& a, const content::Scene& b) {
   std::map<std::string, std::string> groups;
@@ -43,13 +51,13 @@ std::map<std::string, std::string> FreeGroups(const content::Scene& a, const con
 }  // namespace
 
 void MergeScene(const content::Scene& b, const maps::MapInfo& map_a, const maps::MapInfo& map_b,
-                const engine::JoinedMap& joined, content::Scene* scene) {
+                const engine::JoinedMap& joined, const std::set<std::string>& taken, content::Scene* scene) {
   content::Scene aligned = b;
   for (content::Entity& entity : aligned.entities) content::MoveWithAnchor(joined.a_from_b, &entity);
   const auto moved = Moved(aligned, ContentFollower().Follow(aligned, *joined.aligned, *joined.map));
   const std::map<std::string, std::string> groups = FreeGroups(*scene, b);
   for (content::Entity entity : moved->entities) {
-    entity.name = scene->FreeName(entity.name);
+    entity.name = FreeName(*scene, taken, entity.name);
     if (const auto group = groups.find(entity.group); group != groups.end()) entity.group = group->second;
     scene->entities.push_back(std::move(entity));
   }
@@ -65,7 +73,7 @@ void MergeScene(const content::Scene& b, const maps::MapInfo& map_a, const maps:
 content::Scene JoinScenes(const content::Scene& a, const content::Scene& b, const maps::MapInfo& map_a,
                           const maps::MapInfo& map_b, const engine::JoinedMap& joined) {
   content::Scene both = *Moved(a, ContentFollower().Follow(a, *joined.aligned, *joined.map));
-  MergeScene(b, map_a, map_b, joined, &both);
+  MergeScene(b, map_a, map_b, joined, {}, &both);
   return both;
 }
 

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <set>
 #include <string>
 
 #include "app/session/library_scene.h"
@@ -12,10 +13,10 @@
 namespace docent::app {
 
 // Adds the entities of map B to `scene`, the scene of map A in the joined map; each entity stays with its
-// anchor. Duplicate names, also of groups, get a number. A signpost that led from one of the two maps to the
-// other leads nowhere.
+// anchor. Duplicate names, also of groups, get a number, and so do those in `taken`: the history of map A may
+// restore entities with these names. A signpost that led from one of the two maps to the other leads nowhere.
 void MergeScene(const content::Scene& b, const maps::MapInfo& map_a, const maps::MapInfo& map_b,
-                const engine::JoinedMap& joined, content::Scene* scene);
+                const engine::JoinedMap& joined, const std::set<std::string>& taken, content::Scene* scene);
 
 // The content of both maps, in the coordinates of the joined one.
 content::Scene JoinScenes(const content::Scene& a, const content::Scene& b, const maps::MapInfo& map_a,

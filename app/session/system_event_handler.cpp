@@ -215,7 +215,7 @@ void SystemEventHandler::Handle(const engine::SystemEvent& event, const engine::
 void SystemEventHandler::AbsorbMap(SessionMap* from, const engine::JoinedMap& joined, SessionMap* into) {
   auto scene = std::make_shared<content::Scene>(*into->scene);
   const maps::MapInfo map_into = IdentityOf(*into), map_from = IdentityOf(*from);
-  MergeScene(*from->scene, map_into, map_from, joined, scene.get());
+  MergeScene(*from->scene, map_into, map_from, joined, into->history.Names(), scene.get());
   into->scene = std::move(scene);
   into->history.RetargetSignposts([&](content::Signpost* signpost) {
     if (!LeadsTo(*signpost, map_into) && !LeadsTo(*signpost, map_from)) return false;

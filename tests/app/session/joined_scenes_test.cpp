@@ -3,6 +3,8 @@
 
 #include <gtest/gtest.h>
 
+#include "content/edit_history.h"
+#include "content/edits.h"
 #include "engine/base/random.h"
 
 namespace docent::app {
@@ -84,6 +86,19 @@ TEST(JoinedScenes, KeepGroupsOfTheSameNameApart) {
   EXPECT_EQ(both.Find("sign-4")->group, "group-1-3");
   EXPECT_EQ(both.Find("sign-5")->group, "group-1-2");
   EXPECT_EQ(both.Find("sign-6")->group, "");
+}
+
+TEST(JoinedScenes, LeaveTheNamesThatUndoNeeds) {
+  content::Scene a, b;
+  content::EditHistory history;
+  history.Do(content::AddEdit(a, Sign("sign-1", "", {0.5, 0.2, 3})), &a);
+  history.Do(content::RemoveEdit(a, {"sign-1"}), &a);
+  b.entities = {Sign("sign-1", "Garden", {1, 2, 3})};
+  MergeScene(b, Map(1, "East"), Map(2, "West"), Joined({}), history.Names(), &a);
+  ASSERT_NE(a.Find("sign-1-2"), nullptr);
+  EXPECT_EQ(a.Find("sign-1-2")->signpost.to_map, "Garden");
+  ASSERT_TRUE(history.Undo(&a));
+  EXPECT_NE(a.Find("sign-1"), nullptr);
 }
 
 TEST(JoinedScenes, HaveNoSignpostToTheirOwnMap) {
