@@ -80,6 +80,12 @@ bool NumberFields(const char* label, double* values, int count, const char* form
 
 }  // namespace
 
+bool FieldCanHold(const std::string& text) {
+  constexpr unsigned char kLeastLead = 0xF0;  // Of four bytes in UTF-8.
+  return sizeof(ImWchar) > 2 ||
+         std::ranges::none_of(text, [](char c) { return static_cast<unsigned char>(c) >= kLeastLead; });
+}
+
 bool DrawMapChoice(const char* label, const std::vector<MapFacts>& maps, std::string* chosen) {
   const std::string before = *chosen;
   if (ImGui::BeginCombo(label, chosen->empty() ? strings::kLeadsNowhere : chosen->c_str())) {
@@ -246,8 +252,10 @@ void EntitySection::DrawFields(const content::Entity& entity, const AuthoringFac
 void EntitySection::DrawName(const content::Entity& entity, const AuthoringFacts& facts) {
   ImGui::SetNextItemWidth(-1.0f);
   if (std::exchange(begin_rename_, false)) ImGui::SetKeyboardFocusHere();
-  ImGui::InputText("##name", &name_);
+  const bool can_hold = FieldCanHold(name_);
+  ImGui::InputText("##name", &name_, can_hold ? 0 : ImGuiInputTextFlags_ReadOnly);
   is_writing_ = ImGui::IsItemActive();
+  if (!can_hold) return Remark(strings::kNotWritableHere);
   if (!ImGui::IsItemDeactivatedAfterEdit() || name_ == entity.name || name_.empty()) return;
   // A name that another entity has is refused.
   if (facts.scene->Find(name_) == nullptr) asked_name_ = name_;
@@ -256,7 +264,9 @@ void EntitySection::DrawName(const content::Entity& entity, const AuthoringFacts
 
 // The text and, below it, the language whose variant it is.
 void EntitySection::DrawText(const content::Entity& entity) {
-  ImGui::InputTextMultiline("##text", &text_, ImVec2(-1.0f, 3.5f * ImGui::GetTextLineHeight()));
+  const bool can_hold = FieldCanHold(text_);
+  ImGui::InputTextMultiline("##text", &text_, ImVec2(-1.0f, 3.5f * ImGui::GetTextLineHeight()),
+                            can_hold ? 0 : ImGuiInputTextFlags_ReadOnly);
   is_writing_ = ImGui::IsItemActive() || is_writing_;
   const std::string tag = content::LanguageTag(language_);
   const bool is_valid = language_.empty() || !tag.empty();
@@ -268,6 +278,7 @@ void EntitySection::DrawText(const content::Entity& entity) {
   if (ImGui::InputTextWithHint("##language", strings::kLanguageHint, &language_))
     text_ = TextIn(entity, content::LanguageTag(language_));
   if (!is_valid) Remark(strings::kNoLanguage);
+  if (!can_hold) Remark(strings::kNotWritableHere);
   const std::string missing = Joined(content::MissingLanguages(entity, languages_));
   if (!missing.empty()) Remark((strings::kTextWithoutLanguages + missing + ".").c_str());
 }

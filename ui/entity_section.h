@@ -59,6 +59,10 @@ class EntitySection {
 // A drop-down with the maps and "(nowhere)", the empty name. Returns whether *chosen changed.
 bool DrawMapChoice(const char* label, const std::vector<MapFacts>& maps, std::string* chosen);
 
+// Whether a field can be left with the same text in it: a Dear ImGui with characters of 16 bits replaces
+// those above U+FFFF.
+bool FieldCanHold(const std::string& text);
+
 // A rotation as angles in degrees about up (y), right (x) and front (z), in this order, each about the
 // rotated axes, and back.
 Eigen::Vector3d AnglesOf(const engine::Rotation3& rotation);

@@ -8,6 +8,7 @@
 #include <cstdio>
 #include <utility>
 
+#include "ui/entity_section.h"
 #include "ui/strings.h"
 #include "ui/theme.h"
 
@@ -107,7 +108,9 @@ void MapSection::DrawChosen(const MapFacts& map, const AuthoringFacts& facts) {
 void MapSection::DrawName(const MapFacts& map, const AuthoringFacts& facts) {
   ImGui::SetNextItemWidth(0.65f * ImGui::GetContentRegionAvail().x);
   if (std::exchange(begins_rename_, false)) ImGui::SetKeyboardFocusHere();
-  ImGui::InputText(strings::kRename, &name_);
+  const bool can_hold = FieldCanHold(name_);
+  ImGui::InputText(strings::kRename, &name_, can_hold ? 0 : ImGuiInputTextFlags_ReadOnly);
+  if (!can_hold) return MapRemark(strings::kMapNotWritableHere);
   // When the field is left.
   if (!ImGui::IsItemDeactivatedAfterEdit() || name_ == map.name) return;
   asks_removal_ = false;

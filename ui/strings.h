@@ -195,6 +195,10 @@ inline constexpr const char* kLeaveHereHelp = "The arrow points where the camera
 inline constexpr const char* kRemoveArrow = "Remove arrow";
 inline constexpr const char* kLanguageHint = "Language of the text: de, es, …";
 inline constexpr const char* kNoLanguage = "This is not a language tag such as de or es-419.";
+inline constexpr const char* kNotWritableHere =
+    "It has characters, such as emoji, that a field cannot hold. Change it with docent content edit.";
+inline constexpr const char* kMapNotWritableHere =
+    "It has characters, such as emoji, that a field cannot hold. Change it with docent maps rename.";
 inline constexpr const char* kRowWithoutLanguages = "  (no ";  // Followed by "de, es)".
 inline constexpr const char* kTextWithoutLanguages =           // Followed by "de, es.".
     "Other texts of this map are translated. Readers of these languages see this one as it is: ";

@@ -108,6 +108,19 @@ TEST_F(FieldsOfEntities, AFieldIsWrittenOnWhileTheEntityGetsItsNewName) {
   EXPECT_THAT(asked_.words, ElementsAre("rename sign-1 sign-1b", "text sign-1b Elephants!?"));
 }
 
+TEST_F(FieldsOfEntities, CharactersThatAFieldCannotHoldStayWhenItIsLeft) {
+  scene_.entities[0].signpost.text = "Elephants \U0001F418";
+  scene_.entities[1].name = "fox \U0001F98A";
+  Draw();
+  ClickText();
+  ClickImage();
+  selection_.Set({scene_.entities[1].name});
+  Draw();
+  ClickName();
+  ClickImage();
+  EXPECT_THAT(asked_.words, IsEmpty());
+}
+
 TEST_F(FieldsOfEntities, AfterThePanelWasClosedTheNameIsThatOfTheEntityThatIsSelectedThen) {
   ClickName();
   Type("b");

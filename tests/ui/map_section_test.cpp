@@ -81,6 +81,18 @@ TEST_F(ListOfMaps, ARenamedMapStaysChosenUnderItsNewName) {
   EXPECT_THAT(asked_.words, ElementsAre("rename map Hallx to Hallxy"));
 }
 
+TEST_F(ListOfMaps, CharactersThatAFieldCannotHoldStayInTheName) {
+  List({"Hall"});
+  ChooseFirst();
+  ClickName();
+  ClickImage();
+  List({"Hall \U0001F3DB"});
+  ChooseFirst();
+  ClickName();
+  ClickImage();
+  EXPECT_THAT(asked_.words, IsEmpty());
+}
+
 TEST_F(ListOfMaps, AQuestionAboutRemovalIsNotAnsweredForAnotherMap) {
   constexpr float kButtonX = 30, kStep = 4;
   List({"Hall", "Hall2"});
