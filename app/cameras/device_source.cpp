@@ -62,6 +62,7 @@ class DeviceSource : public FrameSource {
   bool Deliver(DeviceStream::Loan loan, engine::Frame* frame);
   void Reopen();
   void Close();
+  void ReleaseHead();
 
   const std::string path_;
   const CameraOptions options_;
@@ -84,6 +85,10 @@ void DeviceSource::Close() {
   stream_.reset();
   last_sequence_.reset();
   since_opened_ = 0;
+}
+
+void DeviceSource::ReleaseHead() {
+  if (Head* const own = head()) own->Release();
 }
 
 // Gaps in the device's sequence numbers are images that it captured without a free buffer.
@@ -187,6 +192,7 @@ void DeviceSource::Reopen() {
 bool DeviceSource::Next(engine::Frame* frame) {
   if (!stream_) {
     system_->Sleep(kRetry);
+    ReleaseHead();  // A command for an image before the failure may have opened it again.
     Reopen();
   }
   if (stream_) {
@@ -195,6 +201,7 @@ bool DeviceSource::Next(engine::Frame* frame) {
       return true;
     } catch (const DeviceGone& error) {
       Close();
+      ReleaseHead();
       if (!options_.reconnect) throw;
       trouble_ = std::string(error.what()) + " Docent continues when it is connected again.";
     }

@@ -113,6 +113,10 @@ class DeviceHead : public Head {
     if (axes_.tilt) reached.tilt_rad = MoveAxis(*axes_.tilt, from.tilt_rad, to.tilt_rad);
     motion_->LookAt(reached, now);
   }
+  void Release() override {
+    const std::scoped_lock lock(mutex_);
+    if (file_ >= 0) Close();
+  }
 
  private:
   // Initializes the motion model with the position that the device reports, or straight ahead without one.

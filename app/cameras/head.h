@@ -56,6 +56,9 @@ class Head {
   virtual PanTilt At(Timestamp time) const = 0;
   // Moves to the direction, clamped to the range.
   virtual void LookAt(const PanTilt& wanted, Timestamp now) = 0;
+  // Closes the device until the next LookAt. The source calls it when its device is gone, because the kernel
+  // gives a device that comes back the same name only after all its users have closed it.
+  virtual void Release() {}
 };
 
 // Opens the pan-tilt controls of a V4L2 device: absolute ones (arc seconds) or, on devices without these,

@@ -74,7 +74,8 @@ TEST(Webcam, ContinuesAndTurnsItsHeadAfterReconnection) {
   const std::string path = camera->Path();
   ASSERT_NE(path, "");
   const auto source = OpenDevice(path, Options());
-  const auto head = OpenDeviceHead(MakeDeviceSystem(), path);
+  source->SetHead(OpenDeviceHead(MakeDeviceSystem(), path));
+  Head* const head = source->head();
   ASSERT_TRUE(head);
   engine::Frame frame;
   std::optional<Timestamp> before;
@@ -89,8 +90,6 @@ TEST(Webcam, ContinuesAndTurnsItsHeadAfterReconnection) {
   camera.reset();
   for (int i = 0; i < 20 && source->trouble().empty(); ++i) ASSERT_TRUE(source->Next(&frame));
   EXPECT_THAT(source->trouble(), HasSubstr("unplugged"));
-  head->LookAt({20 * kDegree, 0}, FromSeconds(1));
-  EXPECT_NEAR(head->At(FromSeconds(100)).pan_rad, 0, 1e-9) << "an unplugged camera cannot turn";
   camera.emplace();
   ASSERT_EQ(camera->Path(), path) << "all users have closed it, so that it gets the same name";
   for (int i = 0; i < 50 && !source->trouble().empty(); ++i) ASSERT_TRUE(source->Next(&frame));

@@ -46,8 +46,6 @@ class StreamingSystem : public DeviceSystem {
   int Open(const std::string&) override {
     if (camera_->open_error != 0) return Fail(camera_->open_error);
     if (!camera_->plugged_in) return Fail(ENOENT);
-    camera_->sequence = 0;
-    camera_->queue.clear();
     ++camera_->opened;
     return 7;
   }
@@ -78,6 +76,14 @@ class StreamingSystem : public DeviceSystem {
             request == VIDIOC_G_CTRL ? found->second : control->value;
         return 0;
       }
+      case VIDIOC_QUERYCTRL: {
+        auto* query = static_cast<v4l2_queryctrl*>(argument);
+        if (query->id != V4L2_CID_PAN_ABSOLUTE || !camera_->controls.contains(query->id)) return Fail(EINVAL);
+        query->minimum = -100 * 3600;
+        query->maximum = 100 * 3600;
+        query->step = 1;
+        return 0;
+      }
       case VIDIOC_QUERYCAP: {
         auto* capability = static_cast<v4l2_capability*>(argument);
         capability->capabilities = camera_->capabilities;
@@ -93,6 +99,8 @@ class StreamingSystem : public DeviceSystem {
         return 0;
       case VIDIOC_REQBUFS:
         static_cast<v4l2_requestbuffers*>(argument)->count = 3;
+        camera_->sequence = 0;
+        camera_->queue.clear();
         camera_->buffers.assign(3, std::vector<std::uint8_t>(kDeviceWidth * kDeviceHeight * 2));
         return 0;
       case VIDIOC_QUERYBUF: {
@@ -217,6 +225,30 @@ TEST(Device, ContinuesAfterReconnection) {
   EXPECT_GT(frame.time, before);
   EXPECT_EQ(frame.index, 1u);
   EXPECT_EQ(source->delivery().reconnections, 1);
+}
+
+TEST(Device, ClosesItsHeadTooWhenItIsUnplugged) {
+  FakeCamera camera;
+  camera.controls = {{V4L2_CID_PAN_ABSOLUTE, 0}};
+  CameraOptions options;
+  options.reconnect = true;
+  {
+    const auto source = Open(&camera, options);
+    source->SetHead(OpenDeviceHead(std::make_unique<StreamingSystem>(&camera), "/dev/video9"));
+    ASSERT_TRUE(source->head());
+    EXPECT_EQ(camera.opened, 2);
+    engine::Frame frame;
+    ASSERT_TRUE(source->Next(&frame));
+    camera.plugged_in = false;
+    ASSERT_TRUE(source->Next(&frame));
+    EXPECT_EQ(camera.opened, 0) << "only then does the device get the same name again";
+    camera.plugged_in = true;
+    ASSERT_TRUE(source->Next(&frame));
+    EXPECT_FALSE(frame.image.empty());
+    source->head()->LookAt({1, 0}, FromSeconds(1));
+    EXPECT_GT(camera.controls[V4L2_CID_PAN_ABSOLUTE], 0);
+  }
+  EXPECT_EQ(camera.opened, 0);
 }
 
 TEST(Device, CountsImagesThatTheDriverMissed) {
