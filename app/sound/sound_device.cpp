@@ -12,6 +12,7 @@
 #ifdef DOCENT_HAS_OPENAL
 #include <AL/al.h>
 #include <AL/alc.h>
+#include <AL/alext.h>
 #endif
 
 namespace docent::app {
@@ -146,6 +147,13 @@ bool SoundDevice::is_playing() const {
   return !impl_->playing.empty();
 }
 
+bool SoundDevice::is_connected() const {
+  if (alcIsExtensionPresent(impl_->device, "ALC_EXT_disconnect") == ALC_FALSE) return true;
+  ALCint connected = ALC_TRUE;
+  alcGetIntegerv(impl_->device, ALC_CONNECTED, 1, &connected);
+  return connected != ALC_FALSE;
+}
+
 #else
 
 struct SoundDevice::Impl {};
@@ -158,6 +166,9 @@ void SoundDevice::Start(const SoundDirector::Key&, const std::shared_ptr<const c
 void SoundDevice::Stop(const SoundDirector::Key&) {}
 void SoundDevice::Update() {}
 bool SoundDevice::is_playing() const {
+  return false;
+}
+bool SoundDevice::is_connected() const {
   return false;
 }
 

@@ -27,6 +27,8 @@ class SoundDevice {
   // Throws Error when a file turns out to be damaged; its sound ends.
   void Update();
   bool is_playing() const;
+  // False once the system has taken the device away, as when its sound server ends; nothing more is heard.
+  bool is_connected() const;
 
  private:
   struct Impl;

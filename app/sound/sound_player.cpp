@@ -16,7 +16,7 @@ constexpr auto kWait = std::chrono::milliseconds(250);  // Between two looks for
 
 }  // namespace
 
-SoundPlayer::SoundPlayer() {
+SoundPlayer::SoundPlayer(std::chrono::milliseconds retry) : retry_(retry) {
   worker_.emplace("sound", [this](const std::stop_token& stop) { Run(stop); });
 }
 
@@ -54,16 +54,21 @@ std::optional<SoundDirector::Orders> SoundPlayer::Next(const std::stop_token& st
 
 void SoundPlayer::Run(const std::stop_token& stop) {
   std::unique_ptr<SoundDevice> device;
-  bool failed = false;
+  std::chrono::steady_clock::time_point next_try{};
   while (!stop.stop_requested()) {
     const auto orders = Next(stop);
     try {
+      if (device && !device->is_connected()) {
+        device.reset();
+        Report("the sound device was lost");
+      }
       if (device) device->Update();
-      if (!orders || failed) continue;
-      if (!device && !orders->start.empty()) {
-        failed = true;
+      if (!orders) continue;
+      const auto now = std::chrono::steady_clock::now();
+      if (!device && !orders->start.empty() && now >= next_try) {
+        next_try = now + retry_;
         device = std::make_unique<SoundDevice>();
-        failed = false;
+        next_try = {};
       }
       if (!device) continue;
       for (const SoundDirector::Key& key : orders->stop) device->Stop(key);

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <chrono>
 #include <condition_variable>
 #include <deque>
 #include <memory>
@@ -15,10 +16,12 @@ namespace docent::app {
 
 // Plays sounds with OpenAL on a thread of its own, which decodes them piece by piece and opens the device
 // when the first one is to be played. Without OpenAL or a device nothing is heard, and a sentence says so
-// once; everything else goes on. Any thread; no call waits for the device.
+// once; everything else goes on. A device that is missing or was lost is opened again for a later sound. Any
+// thread; no call waits for the device.
 class SoundPlayer {
  public:
-  SoundPlayer();
+  // `retry`: how long no device is opened after that has failed.
+  explicit SoundPlayer(std::chrono::milliseconds retry = std::chrono::seconds(30));
   // Stops all sounds.
   ~SoundPlayer();
   SoundPlayer(const SoundPlayer&) = delete;
@@ -35,6 +38,7 @@ class SoundPlayer {
   std::optional<SoundDirector::Orders> Next(const std::stop_token& stop);
   void Report(const std::string& problem);
 
+  const std::chrono::milliseconds retry_;
   std::mutex mutex_;
   std::condition_variable_any changed_;
   std::deque<SoundDirector::Orders> orders_;  // Guarded by mutex_, as the problem.

@@ -56,7 +56,8 @@ void Speak(const std::string& text, const std::string& language, const std::stop
 
 }  // namespace
 
-Speech::Speech(std::string language) : language_(std::move(language)) {
+Speech::Speech(std::string language, std::chrono::milliseconds retry)
+    : language_(std::move(language)), retry_(retry) {
   worker_.emplace("speech", [this](const std::stop_token& stop) { Run(stop); });
 }
 
@@ -92,13 +93,13 @@ std::optional<std::string> Speech::Next(const std::stop_token& stop) {
 }
 
 void Speech::Run(const std::stop_token& stop) {
-  bool failed = false;
+  std::chrono::steady_clock::time_point next_try{};
   while (const auto text = Next(stop)) {
-    if (failed) continue;
+    if (std::chrono::steady_clock::now() < next_try) continue;
     try {
       Speak(*text, language_, stop);
     } catch (const Error& error) {
-      failed = true;
+      next_try = std::chrono::steady_clock::now() + retry_;
       Report(error.what());
     }
   }

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <chrono>
 #include <condition_variable>
 #include <deque>
 #include <mutex>
@@ -13,12 +14,12 @@ namespace docent::app {
 
 // Speaks texts by Speech Dispatcher, the speech service of the desktop. Its program `spd-say` is run for each
 // text, on a thread of its own, because the calls of its library do not return when the service hangs.
-// Without the service nothing is heard, and a sentence says so once; everything else goes on. Any thread; no
-// call waits for the service.
+// Without the service nothing is heard, and a sentence says so once; everything else goes on, and after a
+// while the service is tried again. Any thread; no call waits for the service.
 class Speech {
  public:
-  // `language`: a tag as that of VisitorStrings.
-  explicit Speech(std::string language);
+  // `language`: a tag as that of VisitorStrings. `retry`: how long nothing is spoken after a failure.
+  explicit Speech(std::string language, std::chrono::milliseconds retry = std::chrono::seconds(30));
   // What the service has been given is still spoken.
   ~Speech();
   Speech(const Speech&) = delete;
@@ -36,6 +37,7 @@ class Speech {
   void Report(const std::string& problem);
 
   const std::string language_;
+  const std::chrono::milliseconds retry_;
   std::mutex mutex_;
   std::condition_variable_any changed_;
   std::deque<std::string> texts_;  // Guarded by mutex_, as the problem.

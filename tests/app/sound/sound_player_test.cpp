@@ -1,0 +1,98 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "app/sound/sound_player.h"
+
+#include <gmock/gmock.h>
+#include <stdlib.h>
+
+#include <chrono>
+#include <filesystem>
+#include <fstream>
+#include <functional>
+#include <memory>
+#include <string>
+#include <thread>
+
+#include "app/sound/sound_device.h"
+#include "content/asset.h"
+#include "engine/base/error.h"
+#include "tests/app/support/temporary_folder.h"
+#include "tests/content/media_samples.h"
+
+namespace docent::app {
+namespace {
+
+using ::testing::HasSubstr;
+
+// The device writes what would be heard into a file, in real time.
+class SoundPlayerOfAFile : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    std::ofstream(folder_ / "alsoft.conf") << "[general]\nchannels=mono\nsample-type=int16\n[wave]\nfile="
+                                           << (folder_ / "device" / "heard.wav").string() << "\n";
+    setenv("ALSOFT_DRIVERS", "wave", 1);
+    setenv("ALSOFT_CONF", (folder_ / "alsoft.conf").c_str(), 1);
+    std::filesystem::create_directory(folder_ / "device");
+    try {
+      const SoundDevice device;
+    } catch (const Error& error) {
+      GTEST_SKIP() << error.what();
+    }
+    std::filesystem::remove_all(folder_ / "device");
+  }
+  void Play(const std::string& name) {
+    constexpr int kRate = 48'000;
+    SoundDirector::Orders orders;
+    orders.start.emplace_back(SoundDirector::Key{1, name},
+                              std::make_shared<content::Asset>(content::AssetFromBytes(
+                                  "tone", content::SoundBytesOf(SF_FORMAT_WAV | SF_FORMAT_PCM_16, 1, kRate,
+                                                                std::size_t{20} * kRate))));
+    player_.Give(orders);
+  }
+  std::string WaitForProblem() {
+    std::string problem;
+    Wait([&] { return !(problem = player_.TakeProblem()).empty(); });
+    return problem;
+  }
+  bool IsHeard() {
+    return Wait([this] {
+      std::error_code error;
+      const auto size = std::filesystem::file_size(folder_ / "device" / "heard.wav", error);
+      return !error && size > 20'000;
+    });
+  }
+
+  const TemporaryFolder folder_;
+  SoundPlayer player_{std::chrono::milliseconds(0)};
+
+ private:
+  static bool Wait(const std::function<bool()>& is_true) {
+    const auto end = std::chrono::steady_clock::now() + std::chrono::seconds(120);
+    while (!is_true()) {
+      if (std::chrono::steady_clock::now() >= end) return false;
+      std::this_thread::sleep_for(std::chrono::milliseconds(20));
+    }
+    return true;
+  }
+};
+
+TEST_F(SoundPlayerOfAFile, PlaysALaterSoundWithADeviceThatWasMissing) {
+  Play("first");
+  EXPECT_THAT(WaitForProblem(), HasSubstr("Sounds are not heard"));
+  std::filesystem::create_directory(folder_ / "device");
+  Play("second");
+  EXPECT_TRUE(IsHeard());
+}
+
+TEST_F(SoundPlayerOfAFile, PlaysALaterSoundAfterItsDeviceWasLost) {
+  // OpenAL gives up a device whose file cannot be written.
+  std::filesystem::create_directory(folder_ / "device");
+  std::filesystem::create_symlink("/dev/full", folder_ / "device" / "heard.wav");
+  Play("first");
+  EXPECT_THAT(WaitForProblem(), HasSubstr("was lost"));
+  std::filesystem::remove(folder_ / "device" / "heard.wav");
+  Play("second");
+  EXPECT_TRUE(IsHeard());
+}
+
+}  // namespace
+}  // namespace docent::app

@@ -1,0 +1,48 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "app/sound/speech.h"
+
+#include <gmock/gmock.h>
+#include <stdlib.h>
+
+#include <chrono>
+#include <filesystem>
+#include <fstream>
+#include <functional>
+#include <string>
+#include <thread>
+
+#include "tests/app/support/temporary_folder.h"
+
+namespace docent::app {
+namespace {
+
+using ::testing::HasSubstr;
+
+bool WaitForSpeech(const std::function<bool()>& is_true) {
+  const auto end = std::chrono::steady_clock::now() + std::chrono::seconds(120);
+  while (!is_true()) {
+    if (std::chrono::steady_clock::now() >= end) return false;
+    std::this_thread::sleep_for(std::chrono::milliseconds(20));
+  }
+  return true;
+}
+
+TEST(Speech, SpeaksAgainOnceTheServiceIsBack) {
+  const TemporaryFolder folder;
+  // Stands for the program of the service; it fails until there is a service.
+  std::ofstream(folder / "spd-say") << "#!/bin/sh\n[ -e '" << (folder / "service").string()
+                                    << "' ] || exit 1\n: > '" << (folder / "spoken").string() << "'\n";
+  std::filesystem::permissions(folder / "spd-say", std::filesystem::perms::owner_all);
+  setenv("PATH", (folder / "").c_str(), 1);
+  Speech speech("en", std::chrono::milliseconds(0));
+  speech.Say("one");
+  std::string problem;
+  EXPECT_TRUE(WaitForSpeech([&] { return !(problem = speech.TakeProblem()).empty(); }));
+  EXPECT_THAT(problem, HasSubstr("there is no speech service"));
+  std::ofstream(folder / "service") << "";
+  speech.Say("two");
+  EXPECT_TRUE(WaitForSpeech([&] { return std::filesystem::exists(folder / "spoken"); }));
+}
+
+}  // namespace
+}  // namespace docent::app
