@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "app/command_line/guide_run.h"
 
+#include <spdlog/spdlog.h>
+
 #include <algorithm>
 #include <cctype>
 #include <exception>
@@ -143,12 +145,20 @@ void GuideRun::Run(const Show& show, std::stop_token window_closed) {
   guarded([&] { session_.Finish(); });
   guarded([&] { hub_.FinishPushing(); });
   guarded([&] {
-    files_->Add(session_.TakeEvents());
+    const std::vector<Event> events = session_.TakeEvents();
+    files_->Add(events);
+    Warn(events);
     WriteDelivery();
     files_->Close();
   });
   guarded([&] {
-    if (host_) host_->Finish();
+    try {
+      if (host_) host_->Finish();
+    } catch (const Error& error) {
+      if (request_.kiosk_code.empty()) throw;
+      spdlog::error("{}",
+                    error.what());  // With a failure, a kiosk that its staff has ended would start again.
+    }
   });
   guarded([&] {
     const std::scoped_lock lock(files_mutex_);
@@ -262,7 +272,7 @@ void GuideRun::WarnAboutUnknownLenses() {
     const std::string warning =
         "The calibration of camera \"" + lens->name + "\" " + assumption +
         ". Build a map with this camera, or give its calibration with --calibration FILE.";
-    files_->Add({Event{{}, "warning", warning}});
+    ReportProblem(warning, {});
     camera_states_[i].message = warning;
   }
 }
@@ -445,13 +455,17 @@ void GuideRun::ShowAgain(const engine::TrackedFrame& tracked, const std::string&
   show(std::move(frame));
 }
 
-// Warnings stay in the author's window until they are dismissed.
+// Warnings stay in the author's window until they are dismissed. Those of a tour are not for its visitors,
+// and without --output the log alone has them.
 void GuideRun::Warn(const std::vector<Event>& events) {
-  if (!has_author_window()) return;
   for (const Event& event : events) {
     if (event.event != "warning") continue;
-    warnings_.insert(event.detail);
-    notices_.Push({SentenceOf(event.detail), std::nullopt});
+    if (has_author_window()) {
+      warnings_.insert(event.detail);
+      notices_.Push({SentenceOf(event.detail), std::nullopt});
+    } else if (!request_.may_write && logged_.insert(event.detail).second) {
+      spdlog::warn("{}", SentenceOf(event.detail));
+    }
   }
 }
 

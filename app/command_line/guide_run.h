@@ -121,6 +121,7 @@ class GuideRun {
   std::mutex
       files_mutex_;  // Guards files_, tallies_, visitor_frames_, warnings_, host_, watch_ and noticed_.
   std::set<std::string> warnings_;    // Those that the window was told of.
+  std::set<std::string> logged_;      // Those of a tour, which has no such window; guarded like these.
   std::vector<CameraTally> tallies_;  // By camera.
   VisitorFrames visitor_frames_;      // Only on a tour it has any.
   std::uint64_t serial_ = 0;          // Of the last frame that was made; guarded like these.

@@ -231,7 +231,8 @@ void VisitLog::Add(VisitRecord visit) {
 void VisitLog::Close() {
   worker_->RequestStop();
   worker_->Join();
-  if (const std::string problem = TakeProblem(); !problem.empty()) throw Error(problem);
+  const std::scoped_lock lock(mutex_);
+  if (!failure_.empty()) throw Error(failure_);
 }
 
 std::string VisitLog::TakeProblem() {
@@ -255,7 +256,9 @@ void VisitLog::Run(const std::stop_token& stop) {
       problem = std::string("A visit is missing in the log: ") + error.what() + ".";
     }
     lock.lock();
-    if (!problem.empty()) problem_ = problem;
+    if (problem.empty()) continue;
+    problem_ = problem;
+    if (failure_.empty()) failure_ = problem;
   }
 }
 

@@ -37,8 +37,8 @@ class VisitLog {
 
   // Does not wait for the disk.
   void Add(VisitRecord visit);
-  // Waits until everything is written. Nothing may be added afterwards. Throws Error when a record is
-  // missing.
+  // Waits until everything is written. Nothing may be added afterwards. Throws Error when any record is
+  // missing, also if TakeProblem has said so.
   void Close();
   // Why a record was not written, as a sentence, once; empty otherwise.
   std::string TakeProblem();
@@ -51,6 +51,7 @@ class VisitLog {
   std::condition_variable_any changed_;
   std::deque<VisitRecord> visits_;  // Guarded by mutex_, as the problem.
   std::string problem_;
+  std::string failure_;           // Of the first record that is missing; guarded too.
   std::optional<Worker> worker_;  // Last: it uses the members above.
 };
 

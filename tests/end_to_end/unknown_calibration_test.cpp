@@ -56,7 +56,11 @@ TEST(UnknownCalibration, TheLibraryStoresTheEstimateForALaterTour) {
   const std::string known = tour(camera, "known");
   EXPECT_THAT(known, HasSubstr("entered Room"));
   EXPECT_THAT(known, Not(HasSubstr("is not in this library")));
-  EXPECT_THAT(tour("sim:room,field-of-view=76,duration=1", "unknown"), HasSubstr("is not in this library"));
+  const std::string other = "sim:room,field-of-view=76,duration=1";
+  EXPECT_THAT(tour(other, "unknown"), HasSubstr("is not in this library"));
+  const Outcome without_output = RunDocent({"tour", "--library", library, "--camera", other, "--calibration",
+                                            "auto", "--headless", "--pace", "lockstep"});
+  EXPECT_THAT(without_output.errors, HasSubstr("is not in this library")) << "nothing else would say so";
 }
 
 }  // namespace

@@ -4,8 +4,10 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <chrono>
 #include <cmath>
 #include <filesystem>
+#include <thread>
 
 #include "app/visits/visit_log.h"
 #include "app/visits/visit_report.h"
@@ -162,6 +164,21 @@ TEST(VisitLog, SaysWhenItCannotBeWritten) {
   std::filesystem::remove_all(folder / "log");
   log.Add(SampleVisit());
   EXPECT_THAT(ErrorOf([&] { log.Close(); }), HasSubstr("A visit is missing in the log"));
+}
+
+TEST(VisitLog, FailsAtItsEndAlsoWhenTheProblemWasTaken) {
+  const TemporaryFolder folder;
+  VisitLog log(folder / "log");
+  std::filesystem::remove_all(folder / "log");
+  log.Add(SampleVisit());
+  std::string problem;
+  const auto end = std::chrono::steady_clock::now() + std::chrono::seconds(120);
+  while ((problem = log.TakeProblem()).empty() && std::chrono::steady_clock::now() < end)
+    std::this_thread::sleep_for(std::chrono::milliseconds(1));
+  EXPECT_THAT(problem, HasSubstr("A visit is missing in the log"));
+  std::filesystem::create_directory(folder / "log");
+  log.Add(SampleVisit());
+  EXPECT_EQ(ErrorOf([&] { log.Close(); }), problem);
 }
 
 TEST(VisitLog, LosesOnlyTheLinesThatCannotBeRead) {
