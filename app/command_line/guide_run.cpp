@@ -144,21 +144,26 @@ void GuideRun::Run(const Show& show, std::stop_token window_closed) {
   }
   guarded([&] { session_.Finish(); });
   guarded([&] { hub_.FinishPushing(); });
-  guarded([&] {
+  // With a failure, a kiosk that its staff has ended would start again.
+  const auto guarded_record = [&](const auto& action) {
+    guarded([&] {
+      try {
+        action();
+      } catch (const Error& error) {
+        if (request_.kiosk_code.empty()) throw;
+        spdlog::error("{}", error.what());
+      }
+    });
+  };
+  guarded_record([&] {
     const std::vector<Event> events = session_.TakeEvents();
     files_->Add(events);
     Warn(events);
     WriteDelivery();
     files_->Close();
   });
-  guarded([&] {
-    try {
-      if (host_) host_->Finish();
-    } catch (const Error& error) {
-      if (request_.kiosk_code.empty()) throw;
-      spdlog::error("{}",
-                    error.what());  // With a failure, a kiosk that its staff has ended would start again.
-    }
+  guarded_record([&] {
+    if (host_) host_->Finish();
   });
   guarded([&] {
     const std::scoped_lock lock(files_mutex_);
@@ -410,6 +415,7 @@ void GuideRun::HandleFrame(const engine::TrackedFrame& tracked, const Show& show
     const std::vector<Event> events = session_.TakeEvents();
     files_->Add(events);
     Warn(events);
+    ReportProblem(files_->TakeProblem(), tracked.frame.time);
     if (request_.on_frame) request_.on_frame(*frame);
   }
   for (const auto& head : heads_) head->AddView(tracked);

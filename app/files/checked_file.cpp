@@ -41,6 +41,21 @@ void CheckedFile::Close() {
   if (error) Fail(error.value());
 }
 
+void KeepUnfinished(const std::filesystem::path& path) {
+  constexpr int kMost = 99;
+  std::filesystem::path part = path;
+  part += ".part";
+  std::error_code error;
+  if (const auto size = std::filesystem::file_size(part, error); error || size == 0) return;
+  for (int i = 1; i <= kMost; ++i) {
+    std::filesystem::path kept = part;
+    kept += "." + std::to_string(i);
+    if (std::filesystem::exists(kept, error) || error) continue;
+    std::filesystem::rename(part, kept, error);
+    return;
+  }
+}
+
 void MakeFolder(const std::filesystem::path& folder) {
   std::error_code error;
   std::filesystem::create_directories(folder, error);

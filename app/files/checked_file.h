@@ -30,6 +30,11 @@ class CheckedFile {
   std::FILE* file_ = nullptr;  // owned
 };
 
+// Renames what a run that crashed has left in NAME.part to NAME.part.1, or to the first number that is free,
+// so that a CheckedFile of this name does not replace it. Beyond 99 such files, and if that fails, nothing
+// happens.
+void KeepUnfinished(const std::filesystem::path& path);
+
 // Creates the folder and any missing parents. Throws Error on failure.
 void MakeFolder(const std::filesystem::path& folder);
 

@@ -36,6 +36,19 @@ TEST(CheckedFile, KeepsTheOldFileWithoutClose) {
   EXPECT_EQ(ReadAll(folder / "list.txt.part"), "half");
 }
 
+TEST(CheckedFile, KeepsWhatCrashedRunsLeftUnderAnotherName) {
+  const TemporaryFolder folder;
+  KeepUnfinished(folder / "list.txt");
+  EXPECT_TRUE(std::filesystem::is_empty(folder.path()));
+  for (const char* text : {"first", "second"}) {
+    folder.Write("list.txt.part", text);
+    KeepUnfinished(folder / "list.txt");
+    CheckedFile(folder / "list.txt").Close();
+  }
+  EXPECT_EQ(ReadAll(folder / "list.txt.part.1"), "first");
+  EXPECT_EQ(ReadAll(folder / "list.txt.part.2"), "second");
+}
+
 TEST(CheckedFile, ReportsAMissingFolder) {
   const TemporaryFolder folder;
   EXPECT_THAT(ErrorOf([&] { CheckedFile file(folder / "none/list.txt"); }), HasSubstr("none/list.txt"));
