@@ -127,7 +127,9 @@ void GuideRun::Run(const Show& show, std::stop_token window_closed) {
   const auto guarded = [&fault](const auto& action) {
     try {
       action();
-    } catch (...) {
+    } catch (const std::exception& error) {
+      // It may say which maps are lost.
+      if (fault) spdlog::error("{}", error.what());
       if (!fault) fault = std::current_exception();
     }
   };

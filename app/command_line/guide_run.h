@@ -33,8 +33,8 @@ class GuideRun {
 
   // Called on the thread of the frame's camera.
   using Show = std::function<void(std::shared_ptr<const ShownFrame>)>;
-  // Saves the maps and closes the files in any case; then throws the first error that occurred. The first
-  // camera runs on the calling thread.
+  // Saves the maps and closes the files in any case; then throws the first error that occurred, and logs
+  // the others. The first camera runs on the calling thread.
   void Run(const Show& show, std::stop_token window_closed);
 
   // Records the latency of a frame that has reached this stage; see WindowLink::reached. Any thread, as all

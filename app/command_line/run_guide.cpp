@@ -1,6 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "app/command_line/run_guide.h"
 
+#include <spdlog/spdlog.h>
+
+#include <exception>
 #include <mutex>
 #include <utility>
 
@@ -122,10 +125,12 @@ void RunWindowed(const GuideRequest& request, std::span<CalibratedCamera> camera
   }
   worker.RequestStop();
   if (fault) {
-    // The window's error came first. The camera thread still saves its results before that error is thrown.
+    // The window's error came first. The camera thread still saves its results before that error is thrown,
+    // and its own error may say which maps are lost.
     try {
       worker.Join();
-    } catch (const Error&) {
+    } catch (const std::exception& error) {
+      spdlog::error("{}", error.what());
     }
     std::rethrow_exception(fault);
   }
