@@ -91,6 +91,7 @@ std::optional<std::string> SessionMemory::ReloadContent(std::uint64_t key) {
     return map == nullptr || map->changed || !map->snapshot ? nullptr : map;
   };
   AssetCache assets;
+  if (pager_) pager_->MapHasChanged(key);
   const maps::MapInfo info = library_->Find(key);
   {
     const std::scoped_lock lock(mutex_);

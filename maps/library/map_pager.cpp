@@ -2,8 +2,10 @@
 #include "maps/library/map_pager.h"
 
 #include <algorithm>
+#include <chrono>
 #include <condition_variable>
 #include <deque>
+#include <exception>
 #include <list>
 #include <map>
 #include <mutex>
@@ -50,6 +52,10 @@ class MapPager::Impl {
   std::vector<MapInfo> Open();
   void Load(std::uint64_t key);
   void Prefetch(const std::vector<std::uint64_t>& keys);
+  void MapHasChanged(std::uint64_t key) {
+    const std::scoped_lock lock(mutex_);
+    unreadable_.erase(key);
+  }
   void Pin(const std::vector<std::uint64_t>& keys);
   std::vector<engine::PlaceCandidate> FindPlaces(const engine::PlaceQuery& query, int count, int per_map,
                                                  std::uint64_t only_map);
@@ -67,13 +73,24 @@ class MapPager::Impl {
     std::size_t bytes = 0;
     std::list<std::uint64_t>::iterator use;  // Position in recently_used_.
   };
+  // A disk may fail for a moment only, so that a map is not given up for good.
+  struct Unreadable {
+    std::string problem;
+    std::chrono::milliseconds pause{};
+    std::chrono::steady_clock::time_point next_try{};
+  };
   void Run(const std::stop_token& stop);
   void Read(std::uint64_t key);  // Reads one map and adds it to the index.
+  // Returns whether the problem is another one than the last time.
+  bool NoteFailure(std::uint64_t key, const std::string& problem);
+  void ReportFailure(std::uint64_t key, const std::string& problem);
   void TryLoad(std::uint64_t key);
   void MakeRoom();
   // Requires mutex_.
   bool IsResidentOrUnreadable(std::uint64_t key) const {
-    return resident_.contains(key) || unreadable_.contains(key);
+    const auto failed = unreadable_.find(key);
+    return resident_.contains(key) ||
+           (failed != unreadable_.end() && std::chrono::steady_clock::now() < failed->second.next_try);
   }
   void Enqueue(std::uint64_t key, bool urgent);
   void Touch(std::uint64_t key);
@@ -89,7 +106,8 @@ class MapPager::Impl {
   std::list<std::uint64_t> recently_used_;  // Keys of the maps in memory, the most recently used first.
   std::map<std::uint64_t, Resident> resident_;
   std::deque<std::uint64_t> load_queue_;  // Keys of the maps to read, the most urgent first.
-  std::set<std::uint64_t> pinned_, unreadable_;
+  std::set<std::uint64_t> pinned_;
+  std::map<std::uint64_t, Unreadable> unreadable_;
   std::size_t bytes_ = 0;
   std::optional<Worker> worker_;  // Declared last, because it uses the other fields.
 };
@@ -145,9 +163,27 @@ void MapPager::Impl::Run(const std::stop_token& stop) {
     const std::uint64_t key = load_queue_.front();
     load_queue_.pop_front();
     lock.unlock();
-    TryLoad(key);
+    try {
+      TryLoad(key);
+    } catch (const std::exception& error) {
+      // Such as too little memory for this map, which need not be the end of the others.
+      ReportFailure(key, "a map cannot be read: " + std::string(error.what()));
+    }
     lock.lock();
   }
+}
+
+bool MapPager::Impl::NoteFailure(std::uint64_t key, const std::string& problem) {
+  const std::scoped_lock lock(mutex_);
+  Unreadable& failed = unreadable_[key];
+  failed.pause =
+      failed.problem.empty() ? options_.first_retry : std::min(2 * failed.pause, options_.longest_retry);
+  failed.next_try = std::chrono::steady_clock::now() + failed.pause;
+  return std::exchange(failed.problem, problem) != problem;
+}
+
+void MapPager::Impl::ReportFailure(std::uint64_t key, const std::string& problem) {
+  if (NoteFailure(key, problem) && callbacks_.failed) callbacks_.failed(key, problem);
 }
 
 void MapPager::Impl::Read(std::uint64_t key) {
@@ -156,20 +192,14 @@ void MapPager::Impl::Read(std::uint64_t key) {
     const std::scoped_lock lock(mutex_);
     if (resident_.contains(key)) return Touch(key);
   }
-  std::size_t bytes = 0;
-  try {
-    const StoredMap map = library_->Load(key, Library::DamagedContent::kLeaveOut);
-    bytes = BytesOf(*map.snapshot);
-    if (callbacks_.loaded) callbacks_.loaded(map);
-    index_->SetMap(key, map.snapshot);
-    if (callbacks_.exists && !callbacks_.exists(key)) return index_->RemoveMap(key);
-  } catch (const Error&) {
-    const std::scoped_lock lock(mutex_);
-    unreadable_.insert(key);
-    throw;
-  }
+  const StoredMap map = library_->Load(key, Library::DamagedContent::kLeaveOut);
+  const std::size_t bytes = BytesOf(*map.snapshot);
+  if (callbacks_.loaded) callbacks_.loaded(map);
+  index_->SetMap(key, map.snapshot);
+  if (callbacks_.exists && !callbacks_.exists(key)) return index_->RemoveMap(key);
   {
     const std::scoped_lock lock(mutex_);
+    unreadable_.erase(key);
     recently_used_.push_front(key);
     resident_[key] = {bytes, recently_used_.begin()};
     bytes_ += bytes;
@@ -182,14 +212,23 @@ void MapPager::Impl::Load(std::uint64_t key) {
     const std::scoped_lock lock(mutex_);
     if (resident_.contains(key)) return Touch(key);
   }
-  Read(key);
+  try {
+    Read(key);
+  } catch (const Error& error) {
+    NoteFailure(key, error.what());
+    throw;
+  }
 }
 
 void MapPager::Impl::TryLoad(std::uint64_t key) {
+  {
+    const std::scoped_lock lock(mutex_);
+    if (resident_.contains(key)) return Touch(key);
+  }
   try {
-    Load(key);
+    Read(key);
   } catch (const Error& error) {
-    if (callbacks_.failed) callbacks_.failed(key, error.what());
+    ReportFailure(key, error.what());
   }
 }
 
@@ -281,6 +320,9 @@ void MapPager::Load(std::uint64_t key) {
 }
 void MapPager::Prefetch(const std::vector<std::uint64_t>& keys) {
   impl_->Prefetch(keys);
+}
+void MapPager::MapHasChanged(std::uint64_t key) {
+  impl_->MapHasChanged(key);
 }
 void MapPager::Pin(const std::vector<std::uint64_t>& keys) {
   impl_->Pin(keys);

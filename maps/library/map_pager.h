@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <chrono>
 #include <cstddef>
 #include <cstdint>
 #include <functional>
@@ -23,6 +24,8 @@ struct PagerOptions {
   // If true, a place query waits until its maps are loaded, so that equal images give equal results in every
   // run. Otherwise a separate thread loads maps, and the result contains only those that are in memory.
   bool wait_for_maps = true;
+  // How long a map that could not be read is not requested again; doubled each time up to the second one.
+  std::chrono::milliseconds first_retry{30'000}, longest_retry{600'000};
   // Maps that are neither found by a lost camera nor loaded at the start.
   std::vector<std::uint64_t> left_out = {};
 };
@@ -44,7 +47,7 @@ class MapPager : public engine::PlaceFinder {
   struct Callbacks {
     // Called when a map was read, before it is added to the index; damaged content was left out
     // (StoredMap::lost_content). May throw docent::Error to mark the map as
-    // unreadable.
+    // unreadable for now.
     std::function<void(const StoredMap& map)> loaded;
     // Asks whether the owner still has the map. Called after a map was added to the index, because it may
     // have been removed while it was read; it then leaves the index again.
@@ -52,7 +55,8 @@ class MapPager : public engine::PlaceFinder {
     // Asks whether a map may be evicted now; return false if it has unsaved changes. After true the pager no
     // longer refers to it.
     std::function<bool(std::uint64_t key)> evict;
-    // Called with a sentence when a map cannot be read; it is not requested again.
+    // Called with a sentence when a map cannot be read, once as long as the sentence is the same. It is
+    // requested again after PagerOptions::first_retry.
     std::function<void(std::uint64_t key, const std::string& problem)> failed;
   };
 
@@ -70,6 +74,8 @@ class MapPager : public engine::PlaceFinder {
   // Loads these maps in the background because they may be needed soon, the likeliest first; the least
   // recently used maps are evicted for them. Does nothing if PagerOptions::wait_for_maps is set.
   void Prefetch(const std::vector<std::uint64_t>& keys);
+  // The library has another version of the map, which is requested also if the last one could not be read.
+  void MapHasChanged(std::uint64_t key);
   // Keeps these maps in memory until the next call.
   void Pin(const std::vector<std::uint64_t>& keys);
 

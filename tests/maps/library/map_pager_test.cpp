@@ -139,6 +139,39 @@ TEST_F(Pager, ReportsAnUnreadableMapOnceAndContinues) {
   EXPECT_EQ(pager.FindPlaces(ViewOf(3), 1, 1, 0).size(), 1u);
 }
 
+TEST_F(Pager, ReadsAMapAgainThatCouldNotBeReadForAWhile) {
+  MakeLibrary(3);
+  int failures_left = 2, problems = 0;
+  MapPager::Callbacks callbacks;
+  callbacks.loaded = [&](const StoredMap& map) {
+    if (map.info.key == 2 && failures_left-- > 0) throw Error("the disk does not answer");
+  };
+  callbacks.failed = [&](std::uint64_t, const std::string&) { ++problems; };
+  PagerOptions options = Options(2.5);
+  options.first_retry = options.longest_retry = std::chrono::milliseconds(0);
+  MapPager pager(&*library_, &index_, options, callbacks);
+  pager.Open();
+  for (int i = 0; i < 3; ++i) pager.FindPlaces(ViewOf(2), 1, 1, 0);
+  EXPECT_THAT(pager.maps_in_memory(), ElementsAre(2));
+  EXPECT_EQ(problems, 1) << "the same problem is reported once";
+}
+
+TEST_F(Pager, ReadsAnUnreadableMapAgainOnceItHasChanged) {
+  MakeLibrary(3);
+  bool is_damaged = true;
+  MapPager::Callbacks callbacks;
+  callbacks.loaded = [&](const StoredMap&) {
+    if (is_damaged) throw Error("it is damaged");
+  };
+  MapPager pager(&*library_, &index_, Options(2.5), callbacks);
+  pager.Open();
+  EXPECT_TRUE(pager.FindPlaces(ViewOf(2), 1, 1, 0).empty());
+  is_damaged = false;
+  EXPECT_TRUE(pager.FindPlaces(ViewOf(2), 1, 1, 0).empty()) << "it is not read with every image";
+  pager.MapHasChanged(2);
+  EXPECT_EQ(pager.FindPlaces(ViewOf(2), 1, 1, 0).size(), 1u);
+}
+
 TEST_F(Pager, AMapThatIsRemovedWhileItIsReadIsNotFoundAgain) {
   MakeLibrary(3);
   bool removed = false;
