@@ -66,9 +66,28 @@ void SessionMemory::AddLoadedMap(const maps::StoredMap& stored) {
     history = StoredHistory(stored.info.key, where, &assets, &problems);
   const std::shared_ptr<const engine::LightEstimate> light =
       stored.mesh && options_.room_light ? LightOn(*stored.snapshot, *stored.mesh) : nullptr;
+  Install(stored, std::move(scene), std::move(history), light, problems, &assets);
+  if (!options_.may_write) ReloadIfChangedSince(stored.info);
+}
+
+// A hub's update that landed while the map was read did not find the map in memory.
+void SessionMemory::ReloadIfChangedSince(const maps::MapInfo& read) {
+  try {
+    if (library_->Find(read.key) != read) ReloadContent(read.key);
+  } catch (const Error& error) {
+    // A map that was removed stays until the session ends.
+    const std::scoped_lock lock(mutex_);
+    state_.AddEvent(state_.LastTime(), "warning", error.what());
+  }
+}
+
+void SessionMemory::Install(const maps::StoredMap& stored, std::shared_ptr<content::Scene> scene,
+                            content::EditHistory history,
+                            const std::shared_ptr<const engine::LightEstimate>& light,
+                            const std::vector<std::string>& problems, AssetCache* assets) {
   const std::scoped_lock lock(mutex_);
   for (const std::string& problem : problems) state_.AddEvent(state_.LastTime(), "warning", problem);
-  assets_.Merge(&assets);
+  assets_.Merge(assets);
   // A map that another process saved since the session began is not part of the session. A known one may have
   // been removed while it was read.
   SessionMap* const known = state_.FindMap(stored.info.key);
@@ -90,6 +109,8 @@ std::optional<std::string> SessionMemory::ReloadContent(std::uint64_t key) {
     SessionMap* const map = library_ == nullptr ? nullptr : state_.FindMap(key);
     return map == nullptr || map->changed || !map->snapshot ? nullptr : map;
   };
+  // The hub's thread and the pager's may both have a reason; the later one must find the newer content.
+  const std::scoped_lock reloading(reloading_mutex_);
   AssetCache assets;
   if (pager_) pager_->MapHasChanged(key);
   const maps::MapInfo info = library_->Find(key);

@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <map>
+#include <memory>
 #include <mutex>
 #include <optional>
 #include <string>
@@ -53,6 +54,10 @@ class SessionMemory {
  private:
   // On the pager's thread, without the mutex.
   void AddLoadedMap(const maps::StoredMap& stored);
+  void Install(const maps::StoredMap& stored, std::shared_ptr<content::Scene> scene,
+               content::EditHistory history, const std::shared_ptr<const engine::LightEstimate>& light,
+               const std::vector<std::string>& problems, AssetCache* assets);
+  void ReloadIfChangedSince(const maps::MapInfo& read);
   content::EditHistory StoredHistory(std::uint64_t key, const std::string& where, AssetCache* assets,
                                      std::vector<std::string>* problems) const;
   bool Evict(std::uint64_t key);
@@ -71,6 +76,7 @@ class SessionMemory {
   std::map<std::uint64_t, std::uint64_t> replaced_;
   // On a tour, the names of copies that visitors are not to read; see maps::NamesForVisitors.
   std::map<std::string, std::string> names_for_visitors_;
+  std::mutex reloading_mutex_;           // Held while content is read again; taken before the session's.
   std::optional<maps::MapPager> pager_;  // last, because its thread calls back into the other members
 };
 

@@ -3,6 +3,9 @@
 
 #include <gtest/gtest.h>
 
+#include <chrono>
+#include <thread>
+
 #include "content/edits.h"
 #include "tests/app/support/simulated_session.h"
 #include "tests/app/support/temporary_folder.h"
@@ -54,6 +57,60 @@ TEST(SessionMemory, ReadsSignpostsAndChangesOfThemThatFollowAJoinedMap) {
     EXPECT_EQ(undone.Find(name)->signpost.to_key, 1u) << name;
     EXPECT_EQ(undone.Find(name)->signpost.to_map, "Hall") << name;
   }
+}
+
+void SaveSign(const std::string& text, maps::Library* library) {
+  content::Scene scene;
+  content::Entity sign;
+  sign.name = "sign";
+  sign.signpost.text = text;
+  scene.entities.push_back(sign);
+  maps::MapRecord record;
+  record.key = 1;
+  record.name = "Hall";
+  record.scene = std::make_shared<maps::SceneRecord>(RecordFromScene(scene));
+  library->Save(record);
+}
+
+TEST(SessionMemory, ShowsContentThatAHubHasUpdatedWhileItsMapWasRead) {
+  const TemporaryFolder folder;
+  maps::Library library =
+      OpenLibrary(folder / "l.docent", maps::Access::kReadWrite, maps::CreateIfMissing::kYes);
+  ASSERT_EQ(library.NewKey(), 1u);
+  SaveSign("old", &library);
+  SessionOptions options = simulated_session::Options(Pace::kEager, "");
+  options.may_write = false;
+  options.memory.wait_for_maps = false;
+  options.memory.left_out = {1};  // Not read at the start.
+  const auto cameras = simulated_session::LensOf(*simulated_session::Room(1));
+  engine::System system(options, cameras);
+  std::mutex mutex;
+  SessionState state(cameras);
+  SessionAssets assets;
+  SessionMemory memory(options, &library, &system, &mutex, &state, &assets);
+  memory.Open();
+  auto towards = std::make_shared<content::Scene>();
+  content::Entity sign;
+  sign.signpost.to_key = 1;
+  towards->entities.push_back(sign);
+  SessionMap yard;
+  yard.scene = towards;
+  {
+    const std::scoped_lock lock(mutex);
+    memory.ExpectNeighbours(yard);
+    // The map is read meanwhile, but cannot be added yet. If it is read later, it is the new one anyway.
+    std::this_thread::sleep_for(std::chrono::seconds(1));
+    SaveSign("new", &library);
+  }
+  std::string shown;
+  const auto end = std::chrono::steady_clock::now() + std::chrono::seconds(120);
+  while (shown != "new" && std::chrono::steady_clock::now() < end) {
+    std::this_thread::sleep_for(std::chrono::milliseconds(5));
+    const std::scoped_lock lock(mutex);
+    const content::Entity* const found = state.FindMap(1)->scene->Find("sign");
+    if (found != nullptr) shown = found->signpost.text;
+  }
+  EXPECT_EQ(shown, "new");
 }
 
 }  // namespace
