@@ -133,6 +133,8 @@ std::optional<std::string> SessionMemory::ReloadContent(std::uint64_t key) {
   map->name = NameOf(info);
   ResolveSignposts(scene.get());
   map->scene = map->saved_scene = std::move(scene);
+  assets.clear();  // Otherwise all that were known would seem to be in use.
+  assets_.EvictUnused();
   return map->name;
 }
 

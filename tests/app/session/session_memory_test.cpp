@@ -113,5 +113,42 @@ TEST(SessionMemory, ShowsContentThatAHubHasUpdatedWhileItsMapWasRead) {
   EXPECT_EQ(shown, "new");
 }
 
+TEST(SessionMemory, ForgetsModelsThatAHubHasReplaced) {
+  const TemporaryFolder folder;
+  maps::Library library =
+      OpenLibrary(folder / "l.docent", maps::Access::kReadWrite, maps::CreateIfMissing::kYes);
+  const std::uint64_t key = library.NewKey();
+  const auto save = [&](const std::string& corner) {
+    content::Scene scene;
+    content::Entity fox;
+    fox.kind = content::Entity::Kind::kModel;
+    fox.name = "fox";
+    fox.model.asset = std::make_shared<content::Asset>(
+        content::ImportAsset(folder.Write("fox.obj", "v 0 0 0\nv " + corner + " 0 0\nv 0 1 0\nf 1 2 3\n")));
+    scene.entities.push_back(fox);
+    maps::MapRecord record;
+    record.key = key;
+    record.name = "Hall";
+    record.scene = std::make_shared<maps::SceneRecord>(RecordFromScene(scene));
+    library.Save(record);
+  };
+  save("1");
+  SessionOptions options = simulated_session::Options(Pace::kLockstep, "");
+  options.may_write = false;
+  const auto cameras = simulated_session::LensOf(*simulated_session::Room(1));
+  engine::System system(options, cameras);
+  std::mutex mutex;
+  SessionState state(cameras);
+  SessionAssets assets;
+  SessionMemory memory(options, &library, &system, &mutex, &state, &assets);
+  memory.Open();
+  EXPECT_EQ(assets.all().size(), 1u);
+  for (const char* corner : {"2", "3", "4"}) {
+    save(corner);
+    EXPECT_TRUE(memory.ReloadContent(key));
+    EXPECT_EQ(assets.all().size(), 1u) << corner;
+  }
+}
+
 }  // namespace
 }  // namespace docent::app
