@@ -37,8 +37,12 @@ class LocalLibrary {
   const std::string& RenewIdentity();
 
   // Keeps authoring sessions away while maps that they may have in memory are replaced. Throws
-  // LibraryInSession if there is one.
+  // LibraryInSession if there is one. Not to be held during a transfer, which may take long.
   SessionLock LockForReplacing() const { return {file_, SessionLockKind::kReplace}; }
+  // Throws LibraryInSession if LockForReplacing would now, so that nothing is transferred in vain.
+  void CheckNoSession() const { const SessionLock lock = LockForReplacing(); }
+  // Throws LocalChange unless the stored map has this stamp, empty for none.
+  void CheckStamp(std::uint64_t key, const std::string& stamp) const;
 
   // Changes whenever the map does: its entry, content, structure or mesh. Empty if there is no such map.
   std::string StampOf(std::uint64_t key) const;
@@ -55,7 +59,6 @@ class LocalLibrary {
   void Remove(std::uint64_t key, const std::string& stamp);
 
  private:
-  void CheckStamp(std::uint64_t key, const std::string& stamp) const;
   void WriteItems(const LocalMap& map, const Retarget& to_local);
   // Whether the library has the structure of the map already.
   bool HasStructure(const LocalMap& map) const;

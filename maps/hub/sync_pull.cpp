@@ -25,12 +25,14 @@ std::string LocalName(SyncSession* session, const std::string& name, std::uint64
 void WriteTheirs(SyncSession* session, const MapLink& link, const HubRevision& theirs, const LocalMap& mine,
                  const std::string& stamp) {
   // No session can have a new map in memory.
-  std::optional<SessionLock> lock;
-  if (!stamp.empty()) lock.emplace(session->options().library, SessionLockKind::kReplace);
+  const bool is_new = stamp.empty();
+  if (!is_new) session->local().CheckNoSession();
   LocalMap map;
   map.facts = theirs.facts;
   map.manifest = theirs.manifest;
   map.items = session->Receive(theirs.manifest, mine);
+  std::optional<SessionLock> lock;
+  if (!is_new) lock.emplace(session->options().library, SessionLockKind::kReplace);
   map.facts.info.key = link.key;
   LocalMap local = map;
   local.facts.info.name = LocalName(session, theirs.facts.info.name, link.key);
@@ -60,15 +62,18 @@ bool LinkEqualMap(SyncSession* session, const MapLink& link, const HubRevision& 
 // Merges what both sides have changed into the library; the next push saves it on the hub.
 void MergeHere(SyncSession* session, const MapInfo& info, const MapLink& link, const HubRevision& theirs,
                const LocalMap& mine) {
-  const SessionLock lock = session->local().LockForReplacing();
+  session->local().CheckNoSession();
   const std::string their_scene = SceneOf(session->Receive({{"scene", theirs.manifest.at("scene")}}, mine));
   Resolution resolution = Resolve(link, mine, theirs, their_scene, session->options().merge);
   if (resolution.needs_two_maps) {
-    SplitOff(session, link);
     MapLink fresh;
-    fresh.key = session->local().library().NewKey();
-    fresh.id = link.id;
-    session->PutLink(fresh);
+    {
+      const SessionLock lock = session->local().LockForReplacing();
+      SplitOff(session, link);
+      fresh.key = session->local().library().NewKey();
+      fresh.id = link.id;
+      session->PutLink(fresh);
+    }
     WriteTheirs(session, fresh, theirs, mine, "");
     return;
   }
@@ -77,6 +82,7 @@ void MergeHere(SyncSession* session, const MapInfo& info, const MapLink& link, c
   sources.manifest["merged"] = HashOf(SceneOf(resolution.map.items));
   LocalMap map = resolution.map;
   map.items = session->Receive(map.manifest, sources);
+  const SessionLock lock = session->local().LockForReplacing();
   LocalMap local = map;
   local.facts.info.name = LocalName(session, map.facts.info.name, info.key);
   map.state = session->local().Write(local, session->ToLocal(), mine.state.stamp);

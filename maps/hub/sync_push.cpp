@@ -85,11 +85,11 @@ void MergeAndSave(SyncSession* session, const MapInfo& info, const MapLink& link
     session->PutLink(AgreedLink(*session, link.id, head.revision, mine, info.name));
     return;
   }
-  // Before the hub saves what a session here would then undo.
-  const SessionLock lock = session->local().LockForReplacing();
+  session->local().CheckNoSession();
   const ItemBytes scene = session->Receive({{"scene", theirs->manifest.at("scene")}}, mine);
   Resolution resolution = Resolve(link, mine, *theirs, SceneOf(scene), session->options().merge);
   if (resolution.needs_two_maps) {
+    const SessionLock lock = session->local().LockForReplacing();
     const MapLink split = SplitOff(session, link);
     AddToHub(session, session->local().library().Find(info.key), split, 0);
     return;
@@ -102,6 +102,10 @@ void MergeAndSave(SyncSession* session, const MapInfo& info, const MapLink& link
   sources.items["merged"] = map.items["scene"];
   sources.manifest["merged"] = HashOf(SceneOf(map.items));
   complete.items = session->Receive(map.manifest, sources);
+  if (!is_theirs) session->SendItems(complete);
+  // Before the hub saves what a session here would then undo, or what was merged before another change here.
+  const SessionLock lock = session->local().LockForReplacing();
+  session->local().CheckStamp(info.key, mine.state.stamp);
   const std::int64_t revision = is_theirs ? head.revision : session->Send(complete, link.id, head.revision);
   LocalMap local = complete;
   local.facts.info.name =

@@ -166,7 +166,7 @@ void SyncSession::CheckStopped() const {
     throw Error("Interrupted; what was transferred stays, and the same command continues.");
 }
 
-std::int64_t SyncSession::Send(const LocalMap& map, const std::string& id, std::int64_t base) {
+void SyncSession::SendItems(const LocalMap& map) {
   const std::vector<std::string> list = hub_.Missing(map.manifest);
   std::set<std::string> missing(list.begin(), list.end());
   for (const auto& [item, bytes] : map.items) {
@@ -177,6 +177,10 @@ std::int64_t SyncSession::Send(const LocalMap& map, const std::string& id, std::
     report_.bytes_sent += bytes.size();
     limit_.Spend(bytes.size(), options_.is_stopped);
   }
+}
+
+std::int64_t SyncSession::Send(const LocalMap& map, const std::string& id, std::int64_t base) {
+  SendItems(map);
   CheckStopped();
   return hub_.SaveMap(id, base, map.facts, map.manifest);
 }

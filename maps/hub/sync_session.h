@@ -64,7 +64,9 @@ class SyncSession {
   // The map as it is in the library, under its name on the hub.
   LocalMap ReadLocal(const MapInfo& info) const;
 
-  // Sends the items that the hub lacks, and saves the map after the revision `base`.
+  // Sends the items that the hub lacks.
+  void SendItems(const LocalMap& map);
+  // The same, and saves the map after the revision `base`.
   std::int64_t Send(const LocalMap& map, const std::string& id, std::int64_t base);
   // All items of a manifest: those that are at hand are taken from there, the others are received.
   ItemBytes Receive(const Manifest& manifest, const LocalMap& at_hand);

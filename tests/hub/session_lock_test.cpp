@@ -63,6 +63,41 @@ TEST_F(HubSessionLock, APullReplacesNoMapOfASession) {
   EXPECT_EQ(TextsOn("b"), "Hello;from a;");
 }
 
+// Whether a session can begin when something is first transferred.
+SyncOptions TryingASession(SyncOptions options, std::optional<bool>* can_begin) {
+  options.is_stopped = [library = options.library, can_begin] {
+    if (*can_begin) return false;
+    try {
+      const SessionLock session(library, SessionLockKind::kSession);
+      *can_begin = true;
+    } catch (const Error&) {
+      *can_begin = false;
+    }
+    return false;
+  };
+  return options;
+}
+
+TEST_F(HubSessionLock, ASessionCanBeginDuringATransfer) {
+  AddSign("a", "sign-2", "from a");
+  Push(SampleSync(Url(), folder_ / "a"));
+  std::optional<bool> can_begin;
+  EXPECT_EQ(Pull(TryingASession(SampleSync(Url(), folder_ / "b"), &can_begin)).problems, 0);
+  EXPECT_EQ(can_begin, true) << "a pull of a map that only the hub has changed";
+  AddSign("a", "sign-3", "from a again");
+  AddSign("b", "sign-4", "from b");
+  Push(SampleSync(Url(), folder_ / "a"));
+  can_begin.reset();
+  EXPECT_EQ(Push(TryingASession(SampleSync(Url(), folder_ / "b"), &can_begin)).problems, 0);
+  EXPECT_EQ(can_begin, true) << "a push of a map that both sides have changed";
+  AddSign("b", "sign-5", "from b again");
+  Push(SampleSync(Url(), folder_ / "b"));
+  AddSign("a", "sign-6", "from a at last");
+  can_begin.reset();
+  EXPECT_EQ(Pull(TryingASession(SampleSync(Url(), folder_ / "a"), &can_begin)).problems, 0);
+  EXPECT_EQ(can_begin, true) << "a pull of a map that both sides have changed";
+}
+
 TEST_F(HubSessionLock, APushDoesNotMergeWhatASessionWouldUndo) {
   AddSign("a", "sign-2", "from a");
   Push(SampleSync(Url(), folder_ / "a"));
