@@ -6,13 +6,17 @@
 #include <string>
 #include <utility>
 
+#include "app/command_line/interruption.h"
+
 namespace docent::app {
 
 void RunHub::Begin(Session* session) {
   if (!hub_) return;
   const auto tell = [session](const std::string& sentence) { session->AddEvent("hub", sentence); };
   if (may_write_) {
-    pusher_.emplace(*hub_, tell);
+    maps::SyncOptions options = *hub_;
+    options.is_stopped = [this] { return may_be_interrupted_ && Interruption::requested(); };
+    pusher_.emplace(std::move(options), tell);
     told_pusher_ = &*pusher_;
     return;
   }
@@ -27,7 +31,14 @@ void RunHub::Begin(Session* session) {
 }
 
 void RunHub::FinishPushing() {
-  if (!pusher_ || pusher_->Finish()) return;
+  if (!pusher_) return;
+  // What has ended the session is not meant for its last changes.
+  may_be_interrupted_ = !Interruption::requested();
+  const bool is_complete = pusher_->Finish([] {
+    spdlog::warn(
+        "The last changes are being sent to the hub; Ctrl-C ends that and leaves them in the library.");
+  });
+  if (is_complete) return;
   spdlog::warn(
       "Not all changes are on the hub. They are saved in the library; send them with docent maps push.");
 }

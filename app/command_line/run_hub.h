@@ -22,7 +22,8 @@ class RunHub {
   // must live until both functions below have been called.
   void Begin(Session* session);
   void StopFollowing() { follower_.reset(); }
-  // Waits until the hub has everything, or warns that it has not.
+  // Waits until the hub has everything, or warns that it has not. Ctrl-C ends the waiting, unless it has
+  // ended the session before.
   void FinishPushing();
 
   // Any thread, at any time.
@@ -33,6 +34,7 @@ class RunHub {
  private:
   const std::optional<maps::SyncOptions>& hub_;
   const bool may_write_;
+  std::atomic<bool> may_be_interrupted_ = false;
   std::optional<maps::HubFollower> follower_;
   std::optional<maps::HubPusher> pusher_;
   std::atomic<maps::HubPusher*> told_pusher_ = nullptr;  // pusher_, once it is there.

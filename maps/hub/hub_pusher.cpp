@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <chrono>
 #include <exception>
+#include <thread>
 #include <utility>
 
 #include "engine/base/error.h"
@@ -13,6 +14,8 @@ namespace docent::maps {
 namespace {
 
 constexpr std::chrono::milliseconds kFirstRetry(500), kLongestRetry(30'000);  // As HubFollower.
+// At the end: how long nobody needs to be told why it waits.
+constexpr std::chrono::milliseconds kLongWait(1000), kBetweenLooks(20);
 
 }  // namespace
 
@@ -33,12 +36,18 @@ void HubPusher::LibraryWasSaved() {
   changed_.notify_all();
 }
 
-bool HubPusher::Finish() {
+bool HubPusher::Finish(const std::function<void()>& takes_long) {
   {
     const std::scoped_lock lock(mutex_);
     is_ending_ = true;
   }
   changed_.notify_all();
+  if (takes_long) {
+    const auto end = std::chrono::steady_clock::now() + kLongWait;
+    while (!worker_.finished() && std::chrono::steady_clock::now() < end)
+      std::this_thread::sleep_for(kBetweenLooks);
+    if (!worker_.finished()) takes_long();
+  }
   worker_.Join();
   return is_complete_;
 }
@@ -68,7 +77,9 @@ bool HubPusher::PushOnce() {
 }
 
 void HubPusher::Run(const std::stop_token& stop) {
-  options_.is_stopped = [stop] { return stop.stop_requested(); };
+  options_.is_stopped = [stop, asked = options_.is_stopped] {
+    return stop.stop_requested() || (asked && asked());
+  };
   std::chrono::milliseconds retry = kFirstRetry;
   while (!stop.stop_requested()) {
     bool is_last = false;
@@ -84,7 +95,11 @@ void HubPusher::Run(const std::stop_token& stop) {
       if (is_last && is_complete_ && !is_due_) return;
       is_due_ = false;
     }
-    if (stop.stop_requested()) return;
+    if (options_.is_stopped()) {
+      is_complete_ = false;
+      if (is_last) return;
+      continue;
+    }
     is_complete_ = PushOnce();
     retry = is_complete_ ? kFirstRetry : std::min(2 * retry, kLongestRetry);
     if (is_last) return;

@@ -22,16 +22,17 @@ class HubPusher {
   // sentence comes twice in a row. May be empty.
   using Tell = std::function<void(const std::string& sentence)>;
 
-  // `options` as for Push; its is_stopped is replaced. The library must exist. What differs now is pushed
-  // too.
+  // `options` as for Push; its is_stopped is called on the pusher's thread. The library must exist. What
+  // differs now is pushed too.
   HubPusher(SyncOptions options, Tell tell);
   ~HubPusher();
 
   // The library was saved. Any thread; never waits for the hub.
   void LibraryWasSaved();
   // Pushes what was saved and not pushed yet, in one attempt, and ends the thread. Returns whether the hub
-  // has everything that it may have. Call it once, by the thread that made this.
-  bool Finish();
+  // has everything that it may have. Calls `takes_long`, which may be empty, once when that takes longer than
+  // a second. Call it once, by the thread that made this.
+  bool Finish(const std::function<void()>& takes_long = {});
 
  private:
   void Run(const std::stop_token& stop);

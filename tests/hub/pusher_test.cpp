@@ -3,6 +3,7 @@
 
 #include <gmock/gmock.h>
 
+#include <atomic>
 #include <chrono>
 #include <thread>
 
@@ -91,6 +92,38 @@ TEST_F(HubPush, AHubThatIsGoneGetsTheChangesWhenItIsBack) {
   EXPECT_TRUE(WaitUntilTold("as revision 2", 20s)) << Told();
   EXPECT_EQ(TextElsewhere(), "during the cut");
   EXPECT_TRUE(pusher.Finish());
+}
+
+TEST_F(HubPush, AnEndThatIsInterruptedSaysThatSomethingIsMissing) {
+  {
+    Library a = OpenSampleLibrary(folder_ / "a");
+    AddSampleMap(&a, "Desk", 7);
+  }
+  SyncOptions options = SampleSync(Url(), folder_ / "a");
+  options.is_stopped = [] { return true; };
+  HubPusher pusher(options, Tell());
+  EXPECT_FALSE(pusher.Finish());
+  EXPECT_EQ(Told().find("was added to the hub"), std::string::npos) << Told();
+}
+
+TEST_F(HubPush, AnEndThatTakesLongSaysSoOnce) {
+  {
+    Library a = OpenSampleLibrary(folder_ / "a");
+    AddSampleMap(&a, "Desk", 7);
+  }
+  std::atomic<bool> is_told = false;
+  SyncOptions options = SampleSync(Url(), folder_ / "a");
+  options.is_stopped = [&] {
+    while (!is_told) std::this_thread::sleep_for(1ms);  // As on a slow line.
+    return false;
+  };
+  HubPusher pusher(options, Tell());
+  int count = 0;
+  EXPECT_TRUE(pusher.Finish([&] {
+    ++count;
+    is_told = true;
+  }));
+  EXPECT_EQ(count, 1);
 }
 
 TEST_F(HubPush, AnEndWithoutAHubSaysThatSomethingIsMissing) {
