@@ -10,35 +10,18 @@
 
 namespace docent::app {
 
-namespace {
-
-// The maps where a visitor can be: the stops of the tour, or all.
-std::vector<std::string> PlaceNames(const GuideRequest& request) {
-  std::vector<std::string> names;
-  if (request.route) {
-    for (const RouteStop& stop : request.route->stops) names.push_back(stop.name);
-  } else if (request.library != nullptr) {
-    const std::vector<maps::MapCopy> copies = maps::FindCopies(*request.library);
-    const auto replaced = maps::ReplacedByCopies(copies);
-    const auto told = maps::NamesForVisitors(request.library->List(), copies);
-    for (const maps::MapInfo& map : request.library->List()) {
-      if (replaced.contains(map.key)) continue;
-      const auto other = told.find(map.name);
-      names.push_back(other == told.end() ? map.name : other->second);
-    }
-  }
-  return names;
-}
-
-}  // namespace
-
 VisitorHost::VisitorHost(const GuideRequest& request, Session* session, std::size_t cameras, Report report)
     : request_(request),
       session_(session),
       report_(std::move(report)),
       strings_(VisitorStringsFor(request.language)),
       visitors_(cameras) {
-  if (request.route) route_.emplace(*request.route);
+  if (request.route) {
+    route_.emplace(*request.route);
+  } else if (request.library != nullptr) {
+    for (const auto& [older, newer] : maps::ReplacedByCopies(maps::FindCopies(*request.library)))
+      replaced_.insert(older);
+  }
   if (request.narrate) {
     narration_.emplace(strings_);
     speech_.emplace(strings_.language);
@@ -55,9 +38,21 @@ VisitorHost::VisitorHost(const GuideRequest& request, Session* session, std::siz
   for (std::size_t i = 0; i < cameras; ++i) Welcome(i);
 }
 
+std::vector<std::string> VisitorHost::PlaceNames() const {
+  std::vector<std::string> names;
+  if (request_.route) {
+    for (const RouteStop& stop : request_.route->stops) names.push_back(stop.name);
+    return names;
+  }
+  for (const Session::MapState& map : session_->Maps()) {
+    if (map.in_library && !replaced_.contains(map.key)) names.push_back(map.name);
+  }
+  return names;
+}
+
 void VisitorHost::Welcome(std::size_t index) {
-  visitors_[index].emplace(session_, PlaceNames(request_), strings_, route_ ? &*route_ : nullptr,
-                           request_.language, request_.gaze);
+  visitors_[index].emplace(session_, PlaceNames(), strings_, route_ ? &*route_ : nullptr, request_.language,
+                           request_.gaze);
 }
 
 void VisitorHost::WatchForNextVisitor(const ShownFrame& frame) {

@@ -1,9 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <cstdint>
 #include <functional>
 #include <memory>
 #include <optional>
+#include <set>
 #include <string>
 #include <utility>
 #include <vector>
@@ -44,6 +46,9 @@ class VisitorHost {
   void Finish();
 
  private:
+  // The maps where a visitor can be: the stops of the tour, or all that the session knows. A new visitor must
+  // not wait for the library.
+  std::vector<std::string> PlaceNames() const;
   void Welcome(std::size_t index);
   // Begins anew when the visitor has left the device, or has finished the tour and is back at its first stop.
   void WatchForNextVisitor(const ShownFrame& frame);
@@ -60,6 +65,7 @@ class VisitorHost {
   Session* const session_;
   const Report report_;
   const VisitorStrings& strings_;
+  std::set<std::uint64_t> replaced_;                   // Maps of which there are newer copies.
   std::optional<RouteState> route_;                    // Only of a tour with stops.
   std::vector<std::optional<VisitorGuide>> visitors_;  // By camera.
   std::optional<Narration> narration_;  // Of the first camera; only with `narrate`, as speech_.

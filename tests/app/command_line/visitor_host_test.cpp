@@ -12,6 +12,7 @@ namespace {
 
 using namespace simulated_session;
 using ::testing::DoubleEq;
+using ::testing::ElementsAre;
 using ::testing::Field;
 using ::testing::IsEmpty;
 using ::testing::UnorderedElementsAre;
@@ -91,6 +92,33 @@ TEST_F(KioskOnAStand, DoesNotBeginAnewWhileItIsTouched) {
   EXPECT_EQ(frame_->visitors_before, 0);
   Stand(200);
   EXPECT_EQ(frame_->visitors_before, 1);
+}
+
+TEST(VisitorHost, WelcomesALaterVisitorWithoutTheLibrary) {
+  const TemporaryFolder folder;
+  maps::Library library =
+      OpenLibrary(folder / "l.docent", maps::Access::kReadWrite, maps::CreateIfMissing::kYes);
+  for (const char* name : {"Hall", "Yard"})
+    library.Save({library.NewKey(), name, maps::Policy::kOpen, nullptr, nullptr});
+  const auto simulation = Room(3);
+  SessionOptions options = Options(Pace::kLockstep, "");
+  options.may_write = false;
+  Session session(options, LensOf(*simulation), &library);
+  GuideRequest request;
+  request.language = "en";
+  request.library = &library;
+  VisitorHost host(request, &session, 1, [](const Event&) {});
+  for (const std::uint64_t key : {1, 2}) library.Remove(key);
+  engine::TrackedFrame first;
+  host.Lead(GuideVisitor{GuideVisitor::Step::kRestart, {}}, first);
+  std::shared_ptr<ShownFrame> frame;
+  for (int i = 0; i < 100; ++i) {
+    frame = std::make_shared<ShownFrame>();
+    frame->seconds = i;
+    frame->tracked.state = engine::TrackingState::kLost;
+    host.Guide(0, simulation->camera(), frame);
+  }
+  EXPECT_THAT(frame->visitor->stops, ElementsAre("Hall", "Yard")) << "the maps of the session";
 }
 
 }  // namespace
