@@ -117,10 +117,16 @@ void Recorder::Close() {
     std::filesystem::remove(recorder.path, ignored);
     return;
   }
-  // The encoder does not report failures, so the file is read back to check it.
+  // The encoder does not report failures, so the file is read back to check it. Its images are not decoded,
+  // so that this takes no longer than reading the bytes.
   const QuietOpenCv quiet;
   cv::VideoCapture check(recorder.path, cv::CAP_FFMPEG);
-  if (!check.isOpened() || !check.grab())
+  std::int64_t found = 0;
+  if (check.isOpened()) {
+    check.set(cv::CAP_PROP_FORMAT, -1);
+    while (found < recorder.frames && check.grab()) ++found;
+  }
+  if (found < recorder.frames)
     throw Error("The recording '" + recorder.path + "' is incomplete. Check that the disk is not full.");
 }
 

@@ -2,8 +2,10 @@
 #include "ui/recorder.h"
 
 #include <gtest/gtest.h>
+#include <sys/resource.h>
 #include <unistd.h>
 
+#include <csignal>
 #include <filesystem>
 #include <numbers>
 #include <opencv2/imgproc.hpp>
@@ -53,6 +55,35 @@ TEST(Recorder, ThrowsAClearErrorWhenItCannotWrite) {
   EXPECT_NE(message("/no such folder/video.mp4", 30).find("/no such folder/video.mp4"), std::string::npos);
   EXPECT_NE(message(Scratch("video.txt").string(), 30).find(".mp4"), std::string::npos);
   EXPECT_NE(message(Scratch("video.mp4").string(), 0).find("rate"), std::string::npos);
+}
+
+TEST(Recorder, ReportsARecordingThatAFullDiskHasCutOff) {
+  const auto old_handler = std::signal(SIGXFSZ, SIG_IGN);
+  rlimit old_limit{};
+  ASSERT_EQ(getrlimit(RLIMIT_FSIZE, &old_limit), 0);
+  for (const char* ending : {"mp4", "mkv", "avi", "mov"}) {
+    const std::filesystem::path path = Scratch(std::string("cut.") + ending);
+    rlimit limit = old_limit;
+    limit.rlim_cur = 200'000;
+    ASSERT_EQ(setrlimit(RLIMIT_FSIZE, &limit), 0);
+    std::string problem;
+    try {
+      Recorder recorder(path.string(), 30);
+      cv::RNG random(1);
+      for (int i = 0; i < 60; ++i) {
+        cv::Mat image(240, 320, CV_8UC3);
+        random.fill(image, cv::RNG::UNIFORM, 0, 255);
+        recorder.Write(image);
+      }
+      recorder.Close();
+    } catch (const Error& error) {
+      problem = error.what();
+    }
+    setrlimit(RLIMIT_FSIZE, &old_limit);
+    EXPECT_NE(problem.find("incomplete"), std::string::npos) << ending << ": " << problem;
+    std::filesystem::remove(path);
+  }
+  std::signal(SIGXFSZ, old_handler);
 }
 
 TEST(Recorder, LeavesNoFileWhenNoImageWasWritten) {
