@@ -12,6 +12,7 @@
 #include "app/command_line/guide_window.h"
 #include "app/command_line/interruption.h"
 #include "app/command_line/progress.h"
+#include "app/files/checked_file.h"
 #include "engine/base/error.h"
 #include "engine/base/worker.h"
 #include "ui/context.h"
@@ -142,6 +143,8 @@ void RunWindowed(const GuideRequest& request, std::span<CalibratedCamera> camera
 std::vector<Session::MapState> RunGuide(const GuideRequest& request, std::span<CalibratedCamera> cameras,
                                         Verbosity verbosity) {
   const Interruption interruption;
+  // A kiosk starts again by itself, and must not erase the recording that shows why.
+  if (!request.kiosk_code.empty() && request.record) KeepEarlier(*request.record);
   if (request.library != nullptr) LoadKnownLenses(*request.library, cameras);
   GuideRun run(request, cameras);
   if (request.headless) {

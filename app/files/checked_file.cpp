@@ -9,6 +9,23 @@
 
 namespace docent::app {
 
+namespace {
+
+// Puts the first number between both parts of a new name that no file has. An empty file need not be kept.
+void RenameToFree(const std::filesystem::path& path, const std::string& before, const std::string& after) {
+  constexpr int kMost = 99;
+  std::error_code error;
+  if (const auto size = std::filesystem::file_size(path, error); error || size == 0) return;
+  for (int i = 1; i <= kMost; ++i) {
+    const std::filesystem::path kept = before + std::to_string(i) + after;
+    if (std::filesystem::exists(kept, error) || error) continue;
+    std::filesystem::rename(path, kept, error);
+    return;
+  }
+}
+
+}  // namespace
+
 CheckedFile::CheckedFile(const std::filesystem::path& path) : path_(path), part_(path) {
   part_ += ".part";
   file_ = std::fopen(part_.c_str(), "wb");
@@ -42,18 +59,13 @@ void CheckedFile::Close() {
 }
 
 void KeepUnfinished(const std::filesystem::path& path) {
-  constexpr int kMost = 99;
-  std::filesystem::path part = path;
-  part += ".part";
-  std::error_code error;
-  if (const auto size = std::filesystem::file_size(part, error); error || size == 0) return;
-  for (int i = 1; i <= kMost; ++i) {
-    std::filesystem::path kept = part;
-    kept += "." + std::to_string(i);
-    if (std::filesystem::exists(kept, error) || error) continue;
-    std::filesystem::rename(part, kept, error);
-    return;
-  }
+  const std::string part = path.string() + ".part";
+  RenameToFree(part, part + ".", "");
+}
+
+void KeepEarlier(const std::filesystem::path& path) {
+  std::filesystem::path stem = path;
+  RenameToFree(path, stem.replace_extension().string() + "-", path.extension().string());
 }
 
 void MakeFolder(const std::filesystem::path& folder) {

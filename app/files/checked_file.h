@@ -35,6 +35,10 @@ class CheckedFile {
 // happens.
 void KeepUnfinished(const std::filesystem::path& path);
 
+// Renames NAME.EXT to NAME-1.EXT, or to the first number that is free. Beyond 99 such files, and if that
+// fails or there is no file, nothing happens.
+void KeepEarlier(const std::filesystem::path& path);
+
 // Creates the folder and any missing parents. Throws Error on failure.
 void MakeFolder(const std::filesystem::path& folder);
 

@@ -49,6 +49,15 @@ TEST(CheckedFile, KeepsWhatCrashedRunsLeftUnderAnotherName) {
   EXPECT_EQ(ReadAll(folder / "list.txt.part.2"), "second");
 }
 
+TEST(CheckedFile, KeepsFilesOfEarlierRunsUnderAnotherName) {
+  const TemporaryFolder folder;
+  KeepEarlier(folder / "tour.mp4");
+  EXPECT_TRUE(std::filesystem::is_empty(folder.path()));
+  for (const char* text : {"first", "second"}) KeepEarlier(folder.Write("tour.mp4", text));
+  EXPECT_EQ(ReadAll(folder / "tour-1.mp4"), "first");
+  EXPECT_EQ(ReadAll(folder / "tour-2.mp4"), "second");
+}
+
 TEST(CheckedFile, ReportsAMissingFolder) {
   const TemporaryFolder folder;
   EXPECT_THAT(ErrorOf([&] { CheckedFile file(folder / "none/list.txt"); }), HasSubstr("none/list.txt"));
