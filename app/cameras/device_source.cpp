@@ -91,13 +91,17 @@ void DeviceSource::ReleaseHead() {
   if (Head* const own = head()) own->Release();
 }
 
-// Gaps in the device's sequence numbers are images that it captured without a free buffer.
+// Gaps in the device's sequence numbers are images that it captured without a free buffer. A few drivers let
+// the numbers jump, by more than a camera can lose before it counts as silent.
 void DeviceSource::CountGap(const DeviceStream::Loan& loan) {
   const std::uint32_t sequence = loan.sequence();
-  if (last_sequence_ && sequence > *last_sequence_ + 1) {
+  constexpr std::uint32_t kMostMissed = 10'000;
+  if (last_sequence_ && sequence > *last_sequence_) {
     const std::uint32_t gap = sequence - *last_sequence_ - 1;
-    delivery_.missed += gap;
-    index_ += gap;
+    if (gap <= kMostMissed) {
+      delivery_.missed += gap;
+      index_ += gap;
+    }
   }
   last_sequence_ = sequence;
 }

@@ -9,6 +9,7 @@ void GapReporter::Report(const engine::Frame& frame, const FrameCallback& shown)
   const auto last = std::exchange(last_, std::pair(frame.index, frame.time));
   if (!last || frame.index <= last->first + 1) return;
   const std::uint64_t steps = frame.index - last->first;
+  if (steps > kMostSteps) return;
   for (std::uint64_t i = 1; i < steps; ++i) {
     engine::TrackedFrame dropped;
     dropped.frame.camera = frame.camera;

@@ -20,10 +20,12 @@ namespace docent::app {
 // its index does not advance, so no frames are invented for that time.
 class GapReporter {
  public:
-  // Calls `shown` with a dropped frame for each image that is missing between the last one and this one.
+  // Calls `shown` with a dropped frame for each image that is missing between the last one and this one. A
+  // jump over more images than a camera can lose is none of images, and is not reported.
   void Report(const engine::Frame& frame, const FrameCallback& shown);
 
  private:
+  static constexpr std::uint64_t kMostSteps = 10'000;
   std::optional<std::pair<std::uint64_t, Timestamp>> last_;
 };
 

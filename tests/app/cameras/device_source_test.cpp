@@ -264,6 +264,17 @@ TEST(Device, CountsImagesThatTheDriverMissed) {
   EXPECT_EQ(source->delivery().delivered, 5u);
 }
 
+TEST(Device, CountsNoImagesWhereItsNumbersJump) {
+  FakeCamera camera;
+  const auto source = Open(&camera);
+  engine::Frame frame;
+  ASSERT_TRUE(source->Next(&frame));
+  camera.sequence += 1u << 31;
+  ASSERT_TRUE(source->Next(&frame));
+  EXPECT_EQ(frame.index, 1u);
+  EXPECT_EQ(source->delivery().missed, 0u);
+}
+
 TEST(Device, DeliversTheNewestImageAndCountsSkippedOnes) {
   FakeCamera camera;
   const auto source = Open(&camera);

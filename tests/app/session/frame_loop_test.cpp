@@ -6,6 +6,7 @@
 #include <chrono>
 #include <thread>
 
+#include "app/session/camera_feed.h"
 #include "app/simulator/simulation.h"
 #include "tests/app/support/simulated_session.h"
 #include "tests/app/support/temporary_folder.h"
@@ -82,6 +83,20 @@ TEST(FrameLoop, ReportsImagesThatALiveSourceLostAsDropped) {
                           std::pair(7ul, kDropped), std::pair(8ul, kLost)));
   EXPECT_THAT(played.times,
               ElementsAre(Timestamp(100), Timestamp(200), Timestamp(300), Timestamp(400), Timestamp(500)));
+}
+
+TEST(GapReporter, ReportsMissingImagesButNoneWhereTheIndexJumps) {
+  GapReporter gaps;
+  int dropped = 0;
+  const std::vector<std::pair<std::uint64_t, int>> cases = {
+      {0, 0}, {3, 2}, {3 + (std::uint64_t{1} << 31), 2}};
+  for (const auto& [index, expected] : cases) {
+    engine::Frame frame;
+    frame.index = index;
+    frame.time = FromSeconds(static_cast<double>(index));
+    gaps.Report(frame, [&](const engine::TrackedFrame&) { ++dropped; });
+    EXPECT_EQ(dropped, expected) << index;
+  }
 }
 
 TEST(FrameLoop, ReportsTroubleOnceAndItsEndAndContinues) {
