@@ -89,6 +89,8 @@ bool MappingThread::Offer(std::uint64_t key, KeyFrameCandidate candidate, std::v
     // Before the adoption is applied, a keyframe would be dropped by it or, worse, be added to the previous
     // map.
     if (key != requested_key_ || adoption_) return false;
+    // Nothing takes the reports any more.
+    if (failed_) return false;
     mapper_.Report(std::move(reports));
     if (!mapper_.Offer(std::move(candidate))) return false;
     has_work_ = true;

@@ -56,7 +56,7 @@ class MappingThread {
   // Joins another map into the map of `key` (see Mapper::Join). Ignored when a map, even the same one, is
   // adopted before it is done; then no update reports it. A newer request replaces a pending one.
   void Join(std::uint64_t key, std::uint64_t number, std::shared_ptr<const MapSnapshot> other);
-  // Returns false when the mapper is busy or works on another map.
+  // Returns false when the mapper is busy, works on another map or has failed.
   bool Offer(std::uint64_t key, KeyFrameCandidate candidate, std::vector<PointReport> reports);
   // Estimates the readout time of a camera; nothing happens where Offer would return false.
   void EstimateReadout(std::uint64_t key, TrackedCorners corners);

@@ -8,6 +8,7 @@
 #include <future>
 #include <opencv2/core.hpp>
 #include <opencv2/imgproc.hpp>
+#include <stdexcept>
 #include <thread>
 #include <vector>
 
@@ -101,6 +102,20 @@ TEST_F(HeldMapper, EndsTheDelayWhenStopIsRequested) {
   stop.request_stop();
   mapping_.WaitUntilIdle(steady_clock::now() + hours(1), stop.get_token());
   EXPECT_FALSE(mapping_.IsIdle());
+}
+
+TEST(MappingThread, TakesNothingAfterItHasFailed) {
+  std::promise<void> failed;
+  engine::MappingThread mapping({}, true, [&](const engine::MappingThread::MapperUpdate& update) {
+    if (update.failure.empty()) throw std::runtime_error("broken");
+    failed.set_value();
+  });
+  mapping.Adopt(1, nullptr);
+  mapping.WaitUntilIdle(steady_clock::now() + hours(1), {});
+  ASSERT_TRUE(mapping.Offer(1, FirstKeyFrame(), {}));
+  ASSERT_EQ(failed.get_future().wait_for(std::chrono::minutes(2)), std::future_status::ready);
+  EXPECT_FALSE(mapping.Offer(1, FirstKeyFrame(), {})) << "its reports would only fill the memory";
+  EXPECT_THROW(mapping.Finish(), std::runtime_error);
 }
 
 TEST(MappingThread, KeepsAnInitialPairWhileTheQueueIsFull) {
