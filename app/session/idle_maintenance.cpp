@@ -66,14 +66,17 @@ bool IdleMaintenance::ComputeMesh(const IdleMap& chosen, const std::atomic<bool>
   std::shared_ptr<const engine::LightEstimate> light;
   if (!mesh->mesh.empty()) {
     fitting = std::make_shared<const engine::MapMesh>(maps::MeshThatFits(*std::move(mesh)));
-    library_->SaveMesh(chosen.key, *fitting);
     if (with_light_) light = LightOn(*chosen.snapshot, *fitting);
   }
-  const std::scoped_lock lock(mutex_);
-  SessionMap* const map = state_.FindMap(chosen.key);
-  if (map == nullptr) return true;
-  map->meshed_revision = chosen.snapshot->revision;
-  if (fitting) map->SetMesh(std::move(fitting), std::move(light));
+  {
+    const std::scoped_lock lock(mutex_);
+    SessionMap* const map = state_.FindMap(chosen.key);
+    if (map == nullptr) return true;
+    // Once per revision, also if it cannot be saved because the disk is full.
+    map->meshed_revision = chosen.snapshot->revision;
+    if (fitting) map->SetMesh(fitting, std::move(light));
+  }
+  if (fitting) library_->SaveMesh(chosen.key, *fitting);
   return true;
 }
 

@@ -6,10 +6,15 @@
 #include <atomic>
 #include <chrono>
 #include <memory>
+#include <mutex>
 #include <thread>
 
+#include "app/session/idle_maintenance.h"
 #include "app/session/session_map.h"
+#include "app/session/session_state.h"
+#include "engine/base/error.h"
 #include "engine/dense/densification.h"
+#include "engine/system/system.h"
 #include "tests/app/support/simulated_session.h"
 #include "tests/app/support/temporary_folder.h"
 
@@ -127,6 +132,27 @@ TEST_F(StoredSurfaces, AreComputedWhileTheSessionIsIdle) {
   ASSERT_TRUE(mesh);
   EXPECT_GT(mesh->mesh.triangles.size(), 100U);
   EXPECT_EQ(engine::StateOf(mesh->keyframes, *library_.Load(key_).snapshot), engine::MeshState::kCurrent);
+}
+
+TEST_F(StoredSurfaces, AreComputedOnceWhenTheyCannotBeSaved) {
+  maps::Library read_only = maps::Library::Open(folder_ / "a.docent", maps::Access::kReadOnly);
+  const auto cameras = LensOf(*Room(1));
+  engine::System system(Options(Pace::kEager, ""), cameras);
+  while (!system.IsMapperIdle()) std::this_thread::sleep_for(std::chrono::milliseconds(1));
+  std::mutex mutex;
+  SessionState state(cameras);
+  SessionMap& map = state.maps[key_];
+  map.key = key_;
+  map.in_library = true;
+  map.snapshot = map.saved_snapshot = MapOfAWalk();
+  map.saved_scene = map.scene;
+  map.maintained_revision = map.snapshot->revision;
+  IdleMaintenance maintenance(&read_only, &system, &mutex, &state, /*with_meshes=*/true,
+                              /*with_light=*/false);
+  const std::atomic<bool> go_on = false;
+  EXPECT_THROW(maintenance.Run(go_on), Error);
+  EXPECT_TRUE(map.mesh) << "this session can use them";
+  EXPECT_FALSE(maintenance.Run(go_on)) << "it would take seconds for each keyframe again";
 }
 
 }  // namespace
