@@ -1,6 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "app/files/checked_file.h"
 
+#include <stdio.h>
+#include <unistd.h>
+
 #include <cerrno>
 #include <string>
 #include <system_error>
@@ -48,8 +51,11 @@ void CheckedFile::Flush() {
   if (std::fflush(file_) != 0) Fail(errno);
 }
 
-void CheckedFile::Close() {
+void CheckedFile::Close(WaitForDisk wait) {
   Flush();
+  // EINVAL: what cannot be waited for, such as a pipe.
+  if (wait == WaitForDisk::kYes && fsync(fileno(file_)) != 0 && errno != EINVAL && errno != ENOTSUP)
+    Fail(errno);
   std::FILE* file = file_;
   file_ = nullptr;
   if (std::fclose(file) != 0) Fail(errno);

@@ -12,6 +12,10 @@ namespace docent::app {
 // unchanged. Every write is checked: a full disk is an Error that names the file. Not copyable; one thread.
 class CheckedFile {
  public:
+  // Whether Close waits until the bytes are on the disk, so that a power cut leaves the old file or the whole
+  // new one. Not for thousands of files that can be made again.
+  enum class WaitForDisk { kNo, kYes };
+
   explicit CheckedFile(const std::filesystem::path& path);
   ~CheckedFile();
   CheckedFile(const CheckedFile&) = delete;
@@ -21,7 +25,7 @@ class CheckedFile {
   // Makes everything written so far visible in NAME.part.
   void Flush();
   // Flushes and renames. Nothing may be written afterwards.
-  void Close();
+  void Close(WaitForDisk wait = WaitForDisk::kYes);
 
  private:
   [[noreturn]] void Fail(int error) const;

@@ -49,7 +49,7 @@ void SequenceWriter::Add(const SequenceImage& image) {
   }
   CheckedFile file(folder_ / name);
   file.Write({reinterpret_cast<const char*>(bytes.data()), bytes.size()});
-  file.Close();
+  file.Close(CheckedFile::WaitForDisk::kNo);
   list_.Write(time + ' ' + name + '\n');
 
   const Eigen::Vector3d& t = image.truth_from_camera.translation;
