@@ -4,10 +4,12 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <stop_token>
 #include <utility>
 
 #include "app/cameras/clipped_source.h"
 #include "app/cameras/simulated_source.h"
+#include "app/command_line/interruption.h"
 #include "app/command_line/progress.h"
 #include "app/evaluation/frame_dump.h"
 #include "app/evaluation/panorama_image.h"
@@ -166,6 +168,14 @@ std::vector<RunKey> RunsOf(const EvaluateOptions& options, const EvaluatedSequen
   return keys;
 }
 
+void CheckRunFolder(const EvaluateOptions& options, const std::filesystem::path& folder) {
+  for (const std::string& recording : options.sequences) {
+    if (!LiesWithin(folder, recording)) continue;
+    throw Error("The files of the run would be written into the recording '" + recording + "', to '" +
+                folder.string() + "'; give another folder with --output.");
+  }
+}
+
 RunRecord Track(const EvaluateOptions& options, const EvaluatedSequence& sequence,
                 const TrackRequest& request, Verbosity verbosity, std::vector<ShownPanorama>* panoramas) {
   CalibratedCamera camera = OpenWindow(sequence, request.key.first_frame, options.window);
@@ -188,17 +198,21 @@ RunRecord Track(const EvaluateOptions& options, const EvaluatedSequence& sequenc
     for (const Event& event : session.TakeEvents()) output.Add(event);
   };
   try {
-    RunFrames(&camera, &session, loop,
-              [&](const engine::TrackedFrame& frame) {
-                const std::size_t number = recorder.frames().size();
-                if (std::count(options.dump_frames.begin(), options.dump_frames.end(), number) > 0)
-                  DumpFrame(request.folder, number, frame, session);
-                recorder.Add(frame, MakeMappingTimes(session.MappingTimes()));
-                output.Add(frame, session.ShownWith(frame).map_name);
-                write_events();
-                progress.Update(recorder.frames().size());
-              },
-              {});
+    std::stop_source stopping;
+    RunFrames(
+        &camera, &session, loop,
+        [&](const engine::TrackedFrame& frame) {
+          if (Interruption::requested()) stopping.request_stop();
+          const std::size_t number = recorder.frames().size();
+          if (std::count(options.dump_frames.begin(), options.dump_frames.end(), number) > 0)
+            DumpFrame(request.folder, number, frame, session);
+          recorder.Add(frame, MakeMappingTimes(session.MappingTimes()));
+          output.Add(frame, session.ShownWith(frame).map_name);
+          write_events();
+          progress.Update(recorder.frames().size());
+        },
+        stopping.get_token());
+    if (stopping.stop_requested()) throw Error("Interrupted; only the runs that were finished are reported.");
     session.Finish();
   } catch (...) {
     write_events();

@@ -53,6 +53,10 @@ std::vector<std::uint64_t> FirstFrames(std::size_t starts, std::uint64_t frames,
 // The requested runs, ordered by start, then seed.
 std::vector<RunKey> RunsOf(const EvaluateOptions& options, const EvaluatedSequence& sequence);
 
+// Throws Error if the folder for the files of a run is a recording that is evaluated, or lies in one: the
+// files would replace its images, or be taken for them the next time.
+void CheckRunFolder(const EvaluateOptions& options, const std::filesystem::path& folder);
+
 // Parameters of one run.
 struct TrackRequest {
   std::string name;              // Name of the sequence in the record.

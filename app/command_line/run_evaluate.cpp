@@ -4,12 +4,14 @@
 #include <exception>
 #include <memory>
 #include <mutex>
+#include <optional>
 #include <set>
 #include <thread>
 #include <utility>
 #include <vector>
 
 #include "app/command_line/evaluate_sequence.h"
+#include "app/command_line/interruption.h"
 #include "app/command_line/progress.h"
 #include "app/command_line/runs.h"
 #include "app/evaluation/html_report.h"
@@ -77,9 +79,9 @@ RunRow EvaluateOneOfMany(const EvaluateOptions& options, const EvaluatedSequence
 }
 
 // Runs all seeds and starts, options.jobs at a time. The rows keep the order of RunsOf. After the first
-// failure no further run is started, and the failure is thrown.
+// failure no further run is started; the rows are then those of the finished runs.
 RunDistribution EvaluateMany(const EvaluateOptions& options, const EvaluatedSequence& sequence,
-                             const std::string& name, Verbosity verbosity) {
+                             const std::string& name, Verbosity verbosity, std::exception_ptr* failure) {
   const std::vector<RunKey> keys = RunsOf(options, sequence);
   RunDistribution distribution{name,
                                ToString(options.engine),
@@ -87,29 +89,29 @@ RunDistribution EvaluateMany(const EvaluateOptions& options, const EvaluatedSequ
                                options.starts,
                                ToSeconds(options.window),
                                !sequence.truth.empty(),
-                               std::vector<RunRow>(keys.size())};
+                               {}};
+  std::vector<std::optional<RunRow>> rows(keys.size());
   Progress progress(name + ", runs", keys.size(), verbosity);
   std::mutex mutex;  // Guards next, done and failure, and the output to the terminal.
   std::size_t next = 0, done = 0;
-  std::exception_ptr failure;
   const auto work = [&] {
     std::unique_lock lock(mutex);
-    while (next < keys.size() && !failure) {
+    while (next < keys.size() && !*failure) {
       const std::size_t i = next++;
       lock.unlock();
       std::exception_ptr fault;
       try {
-        distribution.rows[i] = EvaluateOneOfMany(options, sequence, name, keys[i]);
+        rows[i] = EvaluateOneOfMany(options, sequence, name, keys[i]);
       } catch (...) {
         fault = std::current_exception();
       }
       lock.lock();
       if (fault) {
-        if (!failure) failure = fault;
+        if (!*failure) *failure = fault;
         continue;
       }
       progress.Update(++done);
-      Print(FormatRunLine(distribution.rows[i], distribution), verbosity);
+      Print(FormatRunLine(*rows[i], distribution), verbosity);
     }
   };
   {
@@ -117,8 +119,10 @@ RunDistribution EvaluateMany(const EvaluateOptions& options, const EvaluatedSequ
     for (std::size_t i = 1; i < std::min(options.jobs, keys.size()); ++i) others.emplace_back(work);
     work();
   }
-  if (failure) std::rethrow_exception(failure);
-  Print("\n" + FormatTable(distribution), verbosity);
+  for (std::optional<RunRow>& row : rows) {
+    if (row) distribution.rows.push_back(std::move(*row));
+  }
+  if (!distribution.rows.empty()) Print("\n" + FormatTable(distribution), verbosity);
   return distribution;
 }
 
@@ -146,32 +150,43 @@ void WriteReports(const std::filesystem::path& folder, const std::vector<RunDist
 }  // namespace
 
 void RunEvaluate(const EvaluateOptions& options, Verbosity verbosity) {
+  const Interruption interruption;
   std::vector<EvaluatedRun> runs;
   std::vector<RunDistribution> distributions, compared;
   std::set<std::string> taken;
   std::exception_ptr failure;
+  const auto add_many = [&](const EvaluateOptions& many, const EvaluatedSequence& sequence,
+                            const std::string& name, std::vector<RunDistribution>* all) {
+    RunDistribution distribution = EvaluateMany(many, sequence, name, verbosity, &failure);
+    if (!distribution.rows.empty()) all->push_back(std::move(distribution));
+  };
   const EvaluateOptions other = WithOtherEngine(options);
   for (std::size_t i = 0; i < options.sequences.size() && !failure; ++i) {
     try {
       const EvaluatedSequence sequence = DescribeSequence(options, i);
       CheckDumpFrames(options, sequence);
-      MakeFolder(options.output);  // Only created when a sequence could be opened.
       const std::string name = UniqueFolderName(sequence.name, &taken);
+      CheckRunFolder(options, options.output / name);
+      std::string other_name;
+      if (options.compare) {
+        other_name = UniqueFolderName(name + "-" + ToString(other.engine), &taken);
+        CheckRunFolder(options, options.output / other_name);
+      }
+      MakeFolder(options.output);  // Only created when a sequence could be opened.
       if (options.many_runs()) {
-        distributions.push_back(EvaluateMany(options, sequence, name, verbosity));
+        add_many(options, sequence, name, &distributions);
       } else {
         runs.push_back(Evaluate(options, sequence, name, verbosity));
       }
-      if (!options.compare) continue;
-      const std::string other_name = UniqueFolderName(name + "-" + ToString(other.engine), &taken);
+      if (!options.compare || failure) continue;
       if (options.many_runs()) {
-        compared.push_back(EvaluateMany(other, sequence, other_name, verbosity));
+        add_many(other, sequence, other_name, &compared);
       } else {
         runs.back().compared =
             std::make_shared<EvaluatedRun>(Evaluate(other, sequence, other_name, verbosity));
       }
-    } catch (const Error&) {
-      // The sequences evaluated so far are still reported.
+    } catch (...) {
+      // The runs that were finished are still reported.
       failure = std::current_exception();
     }
   }

@@ -46,4 +46,8 @@ void KeepEarlier(const std::filesystem::path& path);
 // Creates the folder and any missing parents. Throws Error on failure.
 void MakeFolder(const std::filesystem::path& folder);
 
+// Whether `path`, which need not exist, is the file or folder `place` or lies below it, by whatever names and
+// links. False if `place` does not exist.
+bool LiesWithin(const std::filesystem::path& path, const std::filesystem::path& place);
+
 }  // namespace docent::app

@@ -297,6 +297,29 @@ TEST_P(KilledAuthor, LeavesAValidLibrary) {
   for (const maps::MapInfo& info : saved) EXPECT_GE(library.Load(info.key).snapshot->keyframes.size(), 2u);
 }
 
+TEST(Guide, AnInterruptedEvaluationReportsTheFinishedRuns) {
+  const TemporaryFolder folder;
+  const pid_t child = StartDocent({"evaluate", "sim:cylinder:20,duration=0.3", "sim:museum:2", "--output",
+                                   (folder / "report").string(), "--pace", "lockstep"},
+                                  (folder / "out").string(), (folder / "err").string());
+  siginfo_t ended{};
+  while (!std::filesystem::exists(folder / "report/museum-2/frames.csv.part")) {
+    waitid(P_PID, static_cast<id_t>(child), &ended, WEXITED | WNOHANG | WNOWAIT);
+    if (ended.si_pid == child) break;
+    std::this_thread::sleep_for(std::chrono::milliseconds(5));
+  }
+  kill(child, SIGINT);
+  int status = 0;
+  waitpid(child, &status, 0);
+  ASSERT_TRUE(WIFEXITED(status));
+  EXPECT_EQ(WEXITSTATUS(status), 1);
+  const std::string errors = ReadAll(folder / "err");
+  EXPECT_THAT(errors, HasSubstr("Interrupted"));
+  EXPECT_EQ(std::count(errors.begin(), errors.end(), '\n'), 1) << errors;
+  const auto report = nlohmann::json::parse(ReadAll(folder / "report/report.json"));
+  EXPECT_EQ(report.at("sequences").size(), 1u);
+}
+
 TEST(Guide, ReportsBadInputInOneLine) {
   const TemporaryFolder folder;
   const std::string library = (folder / "l.docent").string(), output = (folder / "out").string();
