@@ -48,9 +48,13 @@ class VideoSource : public FrameSource {
     const double count = capture_.get(cv::CAP_PROP_FRAME_COUNT);  // Only an estimate in some containers.
     if (std::isfinite(count) && count >= 1 && count < 1e9) announced_count_ = count;
     if (timestamps_path) {
-      info_.frame_count = times_.size();
-      info_.nominal_fps = MedianFps(times_);
-      info_.duration = TimeSpanOf(times_);
+      std::vector<Timestamp> used;
+      for (const std::optional<Timestamp>& time : times_) {
+        if (time) used.push_back(*time);
+      }
+      info_.frame_count = used.size();
+      info_.nominal_fps = MedianFps(used);
+      info_.duration = TimeSpanOf(used);
     } else if (announced_count_) {
       info_.frame_count = static_cast<std::uint64_t>(*announced_count_);
     }
@@ -72,27 +76,33 @@ class VideoSource : public FrameSource {
   // The images after it may need it, so it is decoded, but not converted and copied.
   bool NextLate(engine::Frame* frame) override { return Grab(frame); }
   std::optional<Timestamp> NextTime() const override {
-    if (index_ >= times_.size()) return std::nullopt;
-    return times_[index_];
+    for (std::size_t i = read_; i < times_.size(); ++i) {
+      if (times_[i]) return times_[i];
+    }
+    return std::nullopt;
   }
 
  private:
-  // Decodes the next image and sets all but the image itself.
+  // Decodes the next image that is used and sets all but the image itself.
   bool Grab(engine::Frame* frame) {
-    if (ended_) return false;
-    if (!capture_.grab()) {
-      ended_ = true;
-      CheckEnd();
-      return false;
+    for (;;) {
+      if (ended_) return false;
+      if (!capture_.grab()) {
+        ended_ = true;
+        CheckEnd();
+        return false;
+      }
+      if (timestamps_path_ && read_ == times_.size()) {
+        ended_ = true;
+        throw Error(Quoted(*timestamps_path_) + " has " + std::to_string(times_.size()) + " times, but " +
+                    Quoted(path_) + " has more images.");
+      }
+      const std::size_t image = read_++;
+      if (timestamps_path_ && !times_[image]) continue;
+      frame->time = timestamps_path_ ? *times_[image] : ContainerTime();
+      frame->index = index_++;
+      return true;
     }
-    if (timestamps_path_ && index_ == times_.size()) {
-      ended_ = true;
-      throw Error(Quoted(*timestamps_path_) + " has " + std::to_string(times_.size()) + " times, but " +
-                  Quoted(path_) + " has more images.");
-    }
-    frame->time = timestamps_path_ ? times_[index_] : ContainerTime();
-    frame->index = index_++;
-    return true;
   }
 
   // The container's time if it is later than the previous one. The decoder reports no time for the images
@@ -116,8 +126,8 @@ class VideoSource : public FrameSource {
 
   void CheckEnd() const {
     if (timestamps_path_) {
-      if (index_ < times_.size()) {
-        throw Error(Quoted(path_) + " is truncated at image " + std::to_string(index_) + " of the " +
+      if (read_ < times_.size()) {
+        throw Error(Quoted(path_) + " is truncated at image " + std::to_string(read_) + " of the " +
                     std::to_string(times_.size()) + " that " + Quoted(*timestamps_path_) + " lists.");
       }
       return;
@@ -137,10 +147,11 @@ class VideoSource : public FrameSource {
 
   fs::path path_;
   std::optional<fs::path> timestamps_path_;
-  std::vector<Timestamp> times_;
+  std::vector<std::optional<Timestamp>> times_;  // Of each image of the file; empty: it is left out.
   cv::VideoCapture capture_;
   std::optional<double> announced_count_;
-  std::uint64_t index_ = 0;
+  std::size_t read_ = 0;     // Images of the file that were read.
+  std::uint64_t index_ = 0;  // Of the next image that is delivered.
   Timestamp last_time_{}, step_{};
   bool ended_ = false;
 };

@@ -1,9 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "app/cameras/sequence_layout.h"
 
+#include <spdlog/spdlog.h>
+
 #include <algorithm>
 #include <array>
 #include <cctype>
+#include <mutex>
+#include <set>
 #include <string_view>
 
 #include "app/files/text_file.h"
@@ -19,12 +23,57 @@ std::string At(const fs::path& path, int line) {
   return "'" + path.string() + "', line " + std::to_string(line);
 }
 
-void CheckOrder(std::optional<Timestamp> previous, Timestamp time, const fs::path& path, int line) {
-  if (previous && time <= *previous) {
-    throw Error(At(path, line) + ": the time " + FormatSeconds(time) +
-                " is not later than the previous time " + FormatSeconds(*previous) + ".");
-  }
+// Whether nothing was said of this list so far: an evaluation opens a recording for each run.
+bool IsFirstWarning(const fs::path& path) {
+  static std::mutex mutex;
+  static std::set<fs::path> warned;
+  const std::scoped_lock lock(mutex);
+  return warned.insert(path).second;
 }
+
+// Decides which images of a list are used: those whose time is later than that of every image before them. A
+// recorder that stamps two images alike spoils no recording, but a list that is mostly out of order is wrong.
+class TimeFilter {
+ public:
+  explicit TimeFilter(const fs::path& path) : path_(path) {}
+
+  // Whether the image of this line is used. Throws Error for a time that is centuries away: differences of
+  // such times do not fit into 64 bits.
+  bool Use(Timestamp time, int line) {
+    constexpr Timestamp kFarthest = std::chrono::seconds(3'000'000'000);  // 95 years.
+    if (time > kFarthest || time < -kFarthest) {
+      throw Error(At(path_, line) + ": the time " + FormatSeconds(time) +
+                  " s is more than 95 years away from 0.");
+    }
+    if (!latest_ || time > *latest_) {
+      latest_ = time;
+      ++used_;
+      return true;
+    }
+    if (left_out_++ == 0) {
+      first_fault_ = At(path_, line) + ": the time " + FormatSeconds(time) +
+                     " is not later than the previous time " + FormatSeconds(*latest_);
+    }
+    return false;
+  }
+  // Warns of what was left out. Throws Error if that is more than half of the images.
+  void Finish() const {
+    if (left_out_ == 0) return;
+    if (left_out_ > used_) {
+      throw Error(first_fault_ + ", and so it is at " + std::to_string(left_out_) + " of the " +
+                  std::to_string(left_out_ + used_) + " images.");
+    }
+    if (!IsFirstWarning(path_)) return;
+    spdlog::warn("{}; {} of the {} images are left out because of such times.", first_fault_, left_out_,
+                 left_out_ + used_);
+  }
+
+ private:
+  const fs::path path_;
+  std::optional<Timestamp> latest_;
+  std::size_t used_ = 0, left_out_ = 0;
+  std::string first_fault_;
+};
 
 bool HasImageExtension(const fs::path& path) {
   std::string extension = path.extension().string();
@@ -78,6 +127,7 @@ std::vector<TimedPath> ReadTumList(const fs::path& folder) {
   const fs::path list = folder / "rgb.txt";
   const std::string text = ReadTextFile(list);
   std::vector<TimedPath> images;
+  TimeFilter filter(list);
   for (const TextLine& line : ContentLines(text)) {
     const std::size_t blank = line.text.find_first_of(" \t");
     const std::optional<Timestamp> time = ParseSeconds(line.text.substr(0, blank));
@@ -85,9 +135,9 @@ std::vector<TimedPath> ReadTumList(const fs::path& folder) {
       throw Error(At(list, line.number) +
                   ": expected a time in seconds and a file, as in '1.25 rgb/1.25.png'.");
     }
-    CheckOrder(images.empty() ? std::nullopt : std::optional(images.back().time), *time, list, line.number);
-    images.push_back({*time, folder / Trim(line.text.substr(blank))});
+    if (filter.Use(*time, line.number)) images.push_back({*time, folder / Trim(line.text.substr(blank))});
   }
+  filter.Finish();
   if (images.empty()) throw Error("'" + list.string() + "' lists no images.");
   return images;
 }
@@ -98,6 +148,7 @@ std::vector<TimedPath> ReadEurocList(const fs::path& folder) {
   const fs::path list = *camera / "data.csv";
   const std::string text = ReadTextFile(list);
   std::vector<TimedPath> images;
+  TimeFilter filter(list);
   for (const TextLine& line : ContentLines(text)) {
     const std::size_t comma = line.text.find(',');
     const std::optional<std::int64_t> nanoseconds = ParseInteger(Trim(line.text.substr(0, comma)));
@@ -105,9 +156,10 @@ std::vector<TimedPath> ReadEurocList(const fs::path& folder) {
       throw Error(At(list, line.number) + ": expected a time in nanoseconds, a comma and a file.");
     }
     const Timestamp time(*nanoseconds);
-    CheckOrder(images.empty() ? std::nullopt : std::optional(images.back().time), time, list, line.number);
-    images.push_back({time, *camera / "data" / Trim(line.text.substr(comma + 1))});
+    if (filter.Use(time, line.number))
+      images.push_back({time, *camera / "data" / Trim(line.text.substr(comma + 1))});
   }
+  filter.Finish();
   if (images.empty()) throw Error("'" + list.string() + "' lists no images.");
   return images;
 }
@@ -122,16 +174,17 @@ std::vector<TimedPath> ListNumberedImages(const fs::path& folder, double fps) {
   return images;
 }
 
-std::vector<Timestamp> ReadTimestamps(const fs::path& path) {
+std::vector<std::optional<Timestamp>> ReadTimestamps(const fs::path& path) {
   const std::string text = ReadTextFile(path);
-  std::vector<Timestamp> times;
+  std::vector<std::optional<Timestamp>> times;
+  TimeFilter filter(path);
   for (const TextLine& line : ContentLines(text)) {
     const std::optional<Timestamp> time = ParseSeconds(line.text);
     if (!time) throw Error(At(path, line.number) + ": expected one time in seconds.");
-    CheckOrder(times.empty() ? std::nullopt : std::optional(times.back()), *time, path, line.number);
-    times.push_back(*time);
+    times.push_back(filter.Use(*time, line.number) ? time : std::nullopt);
   }
   if (times.empty()) throw Error("'" + path.string() + "' contains no times.");
+  filter.Finish();
   return times;
 }
 

@@ -8,8 +8,9 @@
 
 #include "engine/base/time.h"
 
-// Reads the supported layouts of image sequences into a list of images. Timestamps must increase strictly;
-// otherwise an Error names the file and the line.
+// Reads the supported layouts of image sequences into a list of images. An image whose timestamp is not later
+// than those before it is left out, and a warning says how many. If these are more than half of the images,
+// or a timestamp is more than 95 years away from 0, an Error names the file and the line.
 namespace docent::app {
 
 struct TimedPath {
@@ -31,8 +32,9 @@ std::optional<SequenceLayout> FindLayout(const std::filesystem::path& folder);
 std::vector<TimedPath> ReadTumList(const std::filesystem::path& folder);
 std::vector<TimedPath> ReadEurocList(const std::filesystem::path& folder);
 std::vector<TimedPath> ListNumberedImages(const std::filesystem::path& folder, double fps);
-// Reads timestamps.txt: one time in seconds per line; '#' begins a comment.
-std::vector<Timestamp> ReadTimestamps(const std::filesystem::path& path);
+// Reads timestamps.txt: one time in seconds per line; '#' begins a comment. Empty for an image that is left
+// out.
+std::vector<std::optional<Timestamp>> ReadTimestamps(const std::filesystem::path& path);
 
 // The folder of an EuRoC camera (the one with data.csv), or empty.
 std::optional<std::filesystem::path> FindEurocCamera(const std::filesystem::path& folder);

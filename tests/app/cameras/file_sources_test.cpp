@@ -2,10 +2,14 @@
 #include "app/cameras/file_sources.h"
 
 #include <gmock/gmock.h>
+#include <spdlog/sinks/ostream_sink.h>
+#include <spdlog/spdlog.h>
 
+#include <algorithm>
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 #include <opencv2/videoio.hpp>
+#include <sstream>
 
 #include "app/cameras/clipped_source.h"
 #include "tests/app/support/temporary_folder.h"
@@ -211,14 +215,71 @@ TEST_F(Cameras, ReportMissingImagesAndImagesOfAnotherSize) {
 
 TEST_F(Cameras, NameTheLineOfAnInvalidList) {
   MakeTum();
-  folder_.Write("rgb.txt", "1 rgb/0.png\n1 rgb/1.png\n");
-  EXPECT_THAT(ErrorOfReading(), AllOf(HasSubstr("line 2"), HasSubstr("is not later than")));
+  folder_.Write("rgb.txt", "2 rgb/0.png\n1 rgb/1.png\n2 rgb/2.png\n");
+  EXPECT_THAT(ErrorOfReading(),
+              AllOf(HasSubstr("line 2"), HasSubstr("is not later than"), HasSubstr("2 of the 3 images")));
   folder_.Write("rgb.txt", "1 rgb/0.png\n\nsoon rgb/1.png\n");
   EXPECT_THAT(ErrorOfReading(), HasSubstr("line 3"));
   folder_.Write("rgb.txt", "1\n");
   EXPECT_THAT(ErrorOfReading(), HasSubstr("line 1"));
   folder_.Write("rgb.txt", "# nothing\n");
   EXPECT_THAT(ErrorOfReading(), HasSubstr("no images"));
+}
+
+// What is logged while the call runs.
+template <typename Call>
+std::string LogOf(const Call& call) {
+  std::ostringstream text;
+  const auto before = spdlog::default_logger();
+  spdlog::set_default_logger(
+      std::make_shared<spdlog::logger>("test", std::make_shared<spdlog::sinks::ostream_sink_mt>(text)));
+  call();
+  spdlog::set_default_logger(before);
+  return text.str();
+}
+
+TEST_F(Cameras, LeaveOutImagesWhoseTimesDoNotIncrease) {
+  const TemporaryFolder euroc, video;
+  MakeTum();
+  folder_.Write("rgb.txt", "1 rgb/0.png\n1 rgb/1.png\n0.5 rgb/1.png\n1.5 rgb/1.png\n2 rgb/2.png\n");
+  for (int i = 0; i < 3; ++i) WritePng(euroc / ("data/" + std::to_string(i) + ".png"), Numbered(i));
+  euroc.Write("data.csv",
+              "1000000000,0.png\n1000000000,1.png\n500000000,1.png\n1500000000,1.png\n2000000000,2.png\n");
+  WriteVideo(video / "video.mp4", 5);
+  video.Write("timestamps.txt", "1\n1\n0.5\n1.5\n2\n");
+  for (const TemporaryFolder* folder :
+       std::initializer_list<const TemporaryFolder*>{&folder_, &euroc, &video}) {
+    SCOPED_TRACE(folder->path());
+    std::unique_ptr<FrameSource> source;
+    const std::string log = LogOf([&] { source = OpenCamera(folder->path().string()); });
+    EXPECT_THAT(log, AllOf(HasSubstr("line 2"), HasSubstr("2 of the 5 images are left out")));
+    EXPECT_EQ(std::count(log.begin(), log.end(), '\n'), 1) << log;
+    EXPECT_EQ(source->info().frame_count, 3u);
+    EXPECT_EQ(source->info().duration, std::chrono::seconds(1));
+    EXPECT_EQ(source->NextTime(), std::chrono::seconds(1));
+    engine::Frame first;
+    ASSERT_TRUE(source->Next(&first));
+    EXPECT_EQ(source->NextTime(), std::chrono::milliseconds(1500));
+    const auto frames = ReadFrames(source.get());
+    ASSERT_EQ(frames.size(), 2u);
+    EXPECT_EQ(frames[0].time, std::chrono::milliseconds(1500));
+    EXPECT_EQ(frames[0].index, 1u);
+    EXPECT_EQ(frames[1].time, std::chrono::seconds(2));
+    // The image belongs to its own line: the second image of the folders, the fourth of the video.
+    const int brightness = folder == &video ? 35 : 15;
+    EXPECT_NEAR(frames[0].image.ptr()[0], brightness, 4);
+  }
+}
+
+TEST_F(Cameras, RefuseTimesThatAreCenturiesAway) {
+  WritePng(folder_ / "data/0.png", Numbered(0));
+  for (const char* time : {"9223372036854775807", "-9223372036854775808", "4000000000000000000"}) {
+    folder_.Write("data.csv", "1000,0.png\n" + std::string(time) + ",0.png\n");
+    EXPECT_THAT(ErrorOfReading(), AllOf(HasSubstr("line 2"), HasSubstr("95 years"))) << time;
+  }
+  const TemporaryFolder tum;
+  tum.Write("rgb.txt", "-7000000000 0.png\n7000000000 1.png\n");
+  EXPECT_THAT(ErrorOf([&] { OpenCamera(tum.path().string()); }), HasSubstr("95 years"));
 }
 
 TEST_F(Cameras, ReportInvalidSources) {
