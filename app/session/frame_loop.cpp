@@ -7,6 +7,7 @@
 #include <exception>
 #include <memory>
 #include <mutex>
+#include <optional>
 
 #include "app/session/camera_feed.h"
 #include "engine/base/error.h"
@@ -20,24 +21,33 @@ namespace {
 // more than the slack, than one that another camera has not finished. Any thread.
 class ImageGate {
  public:
-  ImageGate(std::size_t cameras, Timestamp slack) : times_(cameras, Timestamp::min()), slack_(slack) {}
+  ImageGate(std::size_t cameras, Timestamp slack) : cameras_(cameras), slack_(slack) {}
 
   void Wait(std::size_t camera, Timestamp time, const std::stop_token& stop) {
     std::unique_lock lock(mutex_);
-    times_[camera] = time;
+    cameras_[camera] = {time, false};
     changed_.notify_all();
-    changed_.wait(lock, stop,
-                  [&] { return time <= *std::min_element(times_.begin(), times_.end()) + slack_; });
+    changed_.wait(lock, stop, [&] {
+      // A difference of times is in range where the sum of a time and a long period is not.
+      return std::all_of(cameras_.begin(), cameras_.end(), [&](const Camera& other) {
+        return other.left || (other.time && time - *other.time <= slack_);
+      });
+    });
   }
   // The camera has no more images, or none for now.
   void Leave(std::size_t camera) {
     const std::scoped_lock lock(mutex_);
-    times_[camera] = Timestamp::max() - slack_;
+    cameras_[camera].left = true;
     changed_.notify_all();
   }
 
  private:
-  std::vector<Timestamp> times_;  // of the image that each camera is at
+  struct Camera {
+    std::optional<Timestamp> time;  // of the image that it is at
+    bool left = false;
+  };
+
+  std::vector<Camera> cameras_;
   const Timestamp slack_;
   std::mutex mutex_;
   std::condition_variable_any changed_;

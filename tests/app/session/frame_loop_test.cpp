@@ -108,6 +108,38 @@ TEST(FrameLoop, ReportsTroubleOnceAndItsEndAndContinues) {
   EXPECT_THAT(played.frames, ElementsAre(std::pair(0ul, kLost), std::pair(1ul, kLost)));
 }
 
+// Two images that were taken in 2033, according to their times, of a source that takes one in two centuries.
+class SlowSource : public FrameSource {
+ public:
+  SlowSource() {
+    info_.name = "slow";
+    info_.nominal_fps = 1.2e-10;
+    info_.known_camera = SimulatedCamera(160);
+  }
+  bool Next(engine::Frame* frame) override {
+    if (next_ == 2) return false;
+    frame->index = next_;
+    frame->time = std::chrono::seconds(2'000'000'000 + next_++);
+    frame->image = cv::Mat::zeros(120, 160, CV_8UC1);
+    return true;
+  }
+
+ private:
+  std::uint64_t next_ = 0;
+};
+
+TEST(FrameLoop, EndsInEagerPaceWhateverTheRateOfTheImages) {
+  CalibratedCamera camera = Calibrate(std::make_unique<SlowSource>(), std::nullopt);
+  SessionOptions options;
+  options.may_write = false;
+  Session session(options, {camera.model}, nullptr);
+  FrameLoopOptions loop;
+  loop.pace = Pace::kEager;
+  int frames = 0;
+  RunFrames(&camera, &session, loop, [&](const engine::TrackedFrame&) { ++frames; }, {});
+  EXPECT_EQ(frames, 2);
+}
+
 // Delivers the images of a simulation, and is then disconnected for ten seconds.
 class CameraThatIsUnplugged : public FrameSource {
  public:
