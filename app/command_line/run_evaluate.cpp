@@ -1,4 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <spdlog/spdlog.h>
+
 #include <algorithm>
 #include <cstdio>
 #include <exception>
@@ -55,6 +57,13 @@ void Print(const std::string& text, Verbosity verbosity) {
   std::fflush(stdout);
 }
 
+void WarnOfCoverage(const std::string& name, int compared_frames, int tracked_frames) {
+  const std::string warning = CoverageWarning(compared_frames, tracked_frames);
+  if (!warning.empty()) {
+    spdlog::warn("{}: {}; check the times of the ground truth and what it covers.", name, warning);
+  }
+}
+
 EvaluatedRun Evaluate(const EvaluateOptions& options, const EvaluatedSequence& sequence,
                       const std::string& name, Verbosity verbosity) {
   EvaluatedRun run;
@@ -64,6 +73,7 @@ EvaluatedRun Evaluate(const EvaluateOptions& options, const EvaluatedSequence& s
   run.segments = sequence.segments;
   run.report = EvaluateRun(run.run, run.truth, run.segments);
   Print(FormatSummary(run.report), verbosity);
+  if (run.report.has_truth) WarnOfCoverage(name, run.report.compared_frames, run.report.tracked);
   return run;
 }
 
@@ -123,6 +133,11 @@ RunDistribution EvaluateMany(const EvaluateOptions& options, const EvaluatedSequ
     if (row) distribution.rows.push_back(std::move(*row));
   }
   if (!distribution.rows.empty()) Print("\n" + FormatTable(distribution), verbosity);
+  if (distribution.has_truth) {
+    int compared = 0, tracked = 0;
+    for (const RunRow& row : distribution.rows) compared += row.compared_frames, tracked += row.tracked;
+    WarnOfCoverage(name, compared, tracked);
+  }
   return distribution;
 }
 

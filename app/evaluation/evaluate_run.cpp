@@ -76,6 +76,7 @@ std::optional<double> ErrorAboutAxis(const RotationDrift& drift) {
 }
 
 void CompareMap(const std::vector<Pair>& pairs, MapResult* map, std::vector<FrameResult>* frames) {
+  map->compared_frames = static_cast<int>(pairs.size());
   if (pairs.empty()) return;
   const engine::Rotation3 truth_from_map_rotation = TruthFromMapRotation(pairs);
   RootMeanSquare rotation_error;
@@ -85,10 +86,12 @@ void CompareMap(const std::vector<Pair>& pairs, MapResult* map, std::vector<Fram
     (*frames)[pair.frame].rotation_error_deg = error_deg;
     rotation_error.Add(error_deg);
   }
-  map->rotation_rmse_deg = rotation_error.Get();
-  const RotationDrift drift = CompareRotation(pairs.front(), pairs.back());
-  map->rotation_drift_deg = drift.error.Angle() * kDegrees;
-  map->axis_drift_deg = ErrorAboutAxis(drift);
+  if (map->compared_frames >= kMinComparedFrames) {
+    map->rotation_rmse_deg = rotation_error.Get();
+    const RotationDrift drift = CompareRotation(pairs.front(), pairs.back());
+    map->rotation_drift_deg = drift.error.Angle() * kDegrees;
+    map->axis_drift_deg = ErrorAboutAxis(drift);
+  }
 
   std::vector<std::size_t> positioned;  // Indices of frames.
   std::vector<Eigen::Vector3d> in_truth, in_map;
@@ -107,6 +110,7 @@ void CompareMap(const std::vector<Pair>& pairs, MapResult* map, std::vector<Fram
     frame.position_error_m = (*frame.position_in_truth - in_truth[i]).norm();
     position_error.Add(*frame.position_error_m);
   }
+  if (positioned.size() < kMinComparedFrames) return;
   map->ate_rmse_m = position_error.Get();
   map->scale = truth_from_map->scale;
 }
@@ -205,12 +209,14 @@ void SumMaps(const RunRecord& run, SequenceReport* report) {
 
 void CompareWithTruth(const RunRecord& run, const std::vector<TimedPose>& truth,
                       const EvaluationOptions& options, SequenceReport* report) {
+  report->has_truth = !truth.empty();
   std::map<std::uint64_t, std::vector<Pair>> pairs_of_map;
   for (std::size_t i = 0; i < run.frames.size(); ++i) {
     const FrameRecord& frame = run.frames[i];
     if (!report->frame_results[i].tracked) continue;
     const TimedPose* pose = FindPose(truth, frame.time, options.max_time_difference);
     if (!pose) continue;
+    ++report->compared_frames;
     pairs_of_map[frame.map_key].push_back({i, frame.camera_from_map.inverse(), pose->truth_from_camera});
   }
   for (std::size_t i = 0; i < report->maps.size(); ++i) {
@@ -234,6 +240,9 @@ void CompareWithTruth(const RunRecord& run, const std::vector<TimedPose>& truth,
 
 std::vector<SegmentResult> EvaluateSegments(const RunRecord& run, const std::vector<TimedLabel>& labels,
                                             const std::vector<FrameResult>& results) {
+  const bool has_errors = std::count_if(results.begin(), results.end(), [](const FrameResult& frame) {
+                            return frame.position_error_m.has_value();
+                          }) >= kMinComparedFrames;
   std::vector<SegmentResult> segments;
   std::vector<RootMeanSquare> errors;
   std::map<std::string, std::size_t> index_of_label;
@@ -248,7 +257,7 @@ std::vector<SegmentResult> EvaluateSegments(const RunRecord& run, const std::vec
     SegmentResult& segment = segments[entry->second];
     ++segment.frames;
     if (results[i].tracked) ++segment.tracked;
-    if (results[i].position_error_m) errors[entry->second].Add(*results[i].position_error_m);
+    if (has_errors && results[i].position_error_m) errors[entry->second].Add(*results[i].position_error_m);
   }
   for (std::size_t i = 0; i < segments.size(); ++i) {
     segments[i].tracked_ratio = static_cast<double>(segments[i].tracked) / segments[i].frames;
@@ -258,6 +267,16 @@ std::vector<SegmentResult> EvaluateSegments(const RunRecord& run, const std::vec
 }
 
 }  // namespace
+
+std::string CoverageWarning(int compared_frames, int tracked_frames) {
+  constexpr double kSmallShare = 0.25;
+  if (compared_frames == tracked_frames ||
+      (compared_frames >= kMinComparedFrames && compared_frames >= kSmallShare * tracked_frames)) {
+    return {};
+  }
+  return "only " + std::to_string(compared_frames) + " of " + std::to_string(tracked_frames) +
+         " tracked frames have a true pose";
+}
 
 double Quantile(std::vector<double> values, double part) {
   if (values.empty()) return 0;

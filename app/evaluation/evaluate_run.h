@@ -22,6 +22,10 @@
 // have a rotation error, but they take no part in the alignment and the position error.
 namespace docent::app {
 
+// Where the truth covers fewer frames than this, a similarity fits them whatever their errors, and the RMS
+// errors are unknown.
+inline constexpr int kMinComparedFrames = 10;
+
 struct EvaluationOptions {
   Timestamp max_time_difference = std::chrono::milliseconds(10);  // Between a frame and its true pose.
 };
@@ -41,8 +45,9 @@ struct MapResult {
   bool discarded = false;
   std::string joined_into = {};  // See MapRecord.
   int frames = 0;                // Frames with a pose in this map.
+  int compared_frames = 0;       // Of these, those with a true pose.
   std::optional<double>
-      ate_rmse_m;  // Empty without truth, or when the centres do not determine a similarity.
+      ate_rmse_m;  // Empty for fewer than kMinComparedFrames, or centres that determine no similarity.
   // Error of the keyframes after a final global bundle adjustment: the accuracy of the map, whereas
   // ate_rmse_m is the accuracy of the live poses.
   std::optional<double> keyframe_ate_rmse_m;
@@ -69,6 +74,8 @@ struct SequenceReport {
   int frames = 0;
   int tracked = 0;                 // Frames with a pose in a map that was kept.
   int discarded_frames = 0;        // Frames with a pose in a discarded map; they count as untracked.
+  bool has_truth = false;          // Whether there is ground truth, of whatever time.
+  int compared_frames = 0;         // Tracked frames with a true pose.
   int directions_only_frames = 0;  // Tracked frames in a map without finite points, so without a position.
   double tracked_ratio = 0;        // Tracked over all frames from the first tracked one on, including it.
   std::optional<int> first_tracked_frame, last_tracked_frame;
@@ -91,6 +98,9 @@ struct SequenceReport {
 // `truth` and `segments` may be empty.
 SequenceReport EvaluateRun(const RunRecord& run, const std::vector<TimedPose>& truth,
                            const std::vector<TimedLabel>& segments, const EvaluationOptions& options = {});
+
+// A sentence if the ground truth covers so few of the tracked frames that the errors say little; else empty.
+std::string CoverageWarning(int compared_frames, int tracked_frames);
 
 // Quantile of the values by the nearest-rank method; 0 without values. `part` is in (0, 1].
 double Quantile(std::vector<double> values, double part);

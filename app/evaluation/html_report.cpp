@@ -37,6 +37,8 @@ std::string FigureTable(const SequenceReport& r) {
   html += Row("first tracked frame", first);
   html += Row("last tracked frame", r.last_tracked_frame ? std::to_string(*r.last_tracked_frame) : "never");
   html += Row("relocalizations", std::to_string(r.relocalizations));
+  html += Row("compared with the ground truth",
+              r.has_truth ? std::to_string(r.compared_frames) + " frames" : "no ground truth");
   html += Row("ATE RMSE", Fixed(r.ate_rmse_m ? std::optional(*r.ate_rmse_m * 100) : std::nullopt, 2, " cm"));
   html += Row("rotation RMSE", Fixed(r.rotation_rmse_deg, 3, "°"));
   html += Row("rotation error, first to last frame", Fixed(r.rotation_drift_deg, 3, "°"));

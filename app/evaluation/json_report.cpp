@@ -23,6 +23,7 @@ Json ToJson(const MapResult& map) {
           {"discarded", map.discarded},
           {"joined_into", map.joined_into},
           {"frames", map.frames},
+          {"compared_frames", map.compared_frames},
           {"ate_rmse_m", OrNull(map.ate_rmse_m)},
           {"keyframe_ate_rmse_m", OrNull(map.keyframe_ate_rmse_m)},
           {"rotation_rmse_deg", OrNull(map.rotation_rmse_deg)},
@@ -51,6 +52,7 @@ Json ToJson(const SequenceReport& report) {
       {"first_tracked_frame", OrNull(report.first_tracked_frame)},
       {"last_tracked_frame", OrNull(report.last_tracked_frame)},
       {"relocalizations", report.relocalizations},
+      {"compared_frames", report.has_truth ? Json(report.compared_frames) : Json(nullptr)},
       {"ate_rmse_m", OrNull(report.ate_rmse_m)},
       {"rotation_rmse_deg", OrNull(report.rotation_rmse_deg)},
       {"rotation_drift_deg", OrNull(report.rotation_drift_deg)},
@@ -122,6 +124,7 @@ Json ToJson(const RunRow& row) {
                {"frames", row.frames},
                {"tracked", row.tracked},
                {"tracked_share", row.tracked_share},
+               {"compared_frames", row.compared_frames},
                {"ate_rmse_m", OrNull(row.ate_m)},
                {"rotation_rmse_deg", OrNull(row.rotation_deg)},
                {"first_3d_pose_s", OrNull(row.first_3d_pose_s)},
@@ -216,6 +219,10 @@ std::string FormatSummary(const SequenceReport& report) {
   if (report.discarded_frames > 0) {
     text +=
         "; " + std::to_string(report.discarded_frames) + " frames in maps discarded later count as untracked";
+  }
+  if (report.has_truth) {
+    if (const std::string warning = CoverageWarning(report.compared_frames, report.tracked); !warning.empty())
+      text += "; " + warning;
   }
   return text;
 }

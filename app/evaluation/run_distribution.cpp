@@ -35,7 +35,7 @@ constexpr std::array<Figure, 8> kFigures = {{
      [](const RunRow& row) { return std::optional<double>(row.discarded_maps); }},
 }};
 
-// Root mean square of the values that are known.
+// Root mean square of the values that are known; empty if they are too few.
 std::optional<double> RootMeanSquare(const std::vector<FrameResult>& frames,
                                      std::optional<double> FrameResult::*value) {
   double sum = 0;
@@ -45,7 +45,8 @@ std::optional<double> RootMeanSquare(const std::vector<FrameResult>& frames,
     sum += *(frame.*value) * *(frame.*value);
     ++count;
   }
-  return count > 0 ? std::optional(std::sqrt(sum / static_cast<double>(count))) : std::nullopt;
+  return count >= kMinComparedFrames ? std::optional(std::sqrt(sum / static_cast<double>(count)))
+                                     : std::nullopt;
 }
 
 std::string Padded(const std::string& text, std::size_t width, bool left = false) {
@@ -81,6 +82,7 @@ RunRow MakeRunRow(const RunKey& key, const RunRecord& run, const SequenceReport&
   row.frames = report.frames;
   row.tracked = report.tracked;
   row.tracked_share = report.frames > 0 ? static_cast<double>(report.tracked) / report.frames : 0;
+  row.compared_frames = report.compared_frames;
   row.ate_m = RootMeanSquare(report.frame_results, &FrameResult::position_error_m);
   row.rotation_deg = RootMeanSquare(report.frame_results, &FrameResult::rotation_error_deg);
   for (std::size_t i = 0; i < report.frame_results.size() && !row.first_3d_pose_s; ++i) {
@@ -93,11 +95,17 @@ RunRow MakeRunRow(const RunKey& key, const RunRecord& run, const SequenceReport&
   }
   row.tracking_median_ms = report.tracking_median_ms;
   if (!starts) return row;
-  row.false_starts = row.noticed = 0;
-  for (const InitializationResult& start : *starts) {
-    if (!IsFalse(start.outcome)) continue;
-    ++*row.false_starts;
-    *row.noticed += start.discarded;
+  const bool decided =
+      starts->empty() || std::any_of(starts->begin(), starts->end(), [](const InitializationResult& start) {
+        return start.outcome != InitializationOutcome::kUndecided;
+      });
+  if (decided) {
+    row.false_starts = row.noticed = 0;
+    for (const InitializationResult& start : *starts) {
+      if (!IsFalse(start.outcome)) continue;
+      ++*row.false_starts;
+      *row.noticed += start.discarded;
+    }
   }
   row.initializations = std::move(*starts);
   return row;

@@ -27,14 +27,16 @@ struct RunRow {
   RunKey key;
   int frames = 0, tracked = 0;
   double tracked_share = 0;  // Frames tracked in kept maps over all frames of the window.
-  // RMS errors over the frames of all kept maps, each by the alignment of its own map; empty without truth.
+  int compared_frames = 0;   // Tracked frames with a true pose.
+  // RMS errors over the frames of all kept maps, each by the alignment of its own map; empty if fewer than
+  // kMinComparedFrames of them have a true pose.
   std::optional<double> ate_m, rotation_deg;
   // Time from the window's first frame to the first pose in a kept map with finite points.
   std::optional<double> first_3d_pose_s;
   int maps = 0;  // Kept maps with at least one frame.
   int discarded_maps = 0;
   // Number of false initializations, and of those the engine noticed, because it discarded their maps. Empty
-  // without truth.
+  // without truth, and if it decides on no initialization of those that there are.
   std::optional<int> false_starts, noticed;
   double tracking_median_ms = 0;
   std::vector<InitializationResult> initializations;

@@ -287,6 +287,40 @@ TEST(Evaluation, UsesOnlyGroundTruthThatIsCloseInTime) {
   EXPECT_FALSE(EvaluateRun(run, truth, {}).rotation_rmse_deg);
 }
 
+TEST(Evaluation, HasNoErrorsWhereTheTruthCoversAFewFramesOnlyAndSaysSo) {
+  const auto truth = Helix(400);
+  RunRecord run = PerfectRun(truth);
+  for (std::size_t i = 0; i < run.frames.size(); ++i)
+    MoveInTruth(&run.frames[i], {0, i % 2 == 0 ? 0.5 : -0.5, 0});
+  const auto with = [&](std::ptrdiff_t poses) {
+    return EvaluateRun(run, {truth.begin(), truth.begin() + poses}, {{TimeOf(0), "walk"}});
+  };
+  const SequenceReport few = with(9);
+  EXPECT_EQ(few.compared_frames, 9);
+  EXPECT_EQ(few.maps.at(0).compared_frames, 9);
+  EXPECT_FALSE(few.ate_rmse_m);
+  EXPECT_FALSE(few.scale);
+  EXPECT_FALSE(few.rotation_rmse_deg);
+  EXPECT_FALSE(few.segments.at(0).ate_rmse_m);
+  EXPECT_FALSE(MakeRunRow({}, run, few, std::nullopt).ate_m);
+  EXPECT_THAT(FormatSummary(few), HasSubstr("only 9 of 400 tracked frames have a true pose"));
+  const auto json = nlohmann::json::parse(FormatJsonReport({few}));
+  EXPECT_EQ(json.at("sequences").at(0).at("compared_frames"), 9);
+  EXPECT_THAT(FormatHtmlReport({{run, truth, {}, few}}), HasSubstr("9 frames"));
+
+  const SequenceReport part = with(60);
+  EXPECT_TRUE(part.ate_rmse_m);
+  EXPECT_THAT(FormatSummary(part), HasSubstr("only 60 of 400 tracked frames"));
+  EXPECT_THAT(FormatSummary(with(400)), Not(HasSubstr("true pose")));
+  EXPECT_EQ(CoverageWarning(5, 5), "") << "the truth covers all of a short run";
+  EXPECT_EQ(CoverageWarning(0, 0), "");
+  EXPECT_THAT(FormatSummary(EvaluateRun(run, {}, {})), Not(HasSubstr("true pose")));
+
+  // The clocks of the camera and of the ground truth differ.
+  for (FrameRecord& frame : run.frames) frame.time += std::chrono::seconds(100);
+  EXPECT_THAT(FormatSummary(with(400)), HasSubstr("only 0 of 400 tracked frames have a true pose"));
+}
+
 TEST(Evaluation, IsEmptyForAnEmptyRun) {
   const SequenceReport report = EvaluateRun({}, {}, {});
   EXPECT_EQ(report.tracked_ratio, 0);

@@ -73,6 +73,20 @@ TEST(RunDistribution, ReportsMinimumMedianMaximumAndWorstRun) {
   EXPECT_EQ(WorstRun(runs.rows), 2u);
 }
 
+TEST(RunDistribution, CountsNoFalseInitializationsWhereTheTruthDecidesOnNone) {
+  InitializationResult undecided, right;
+  undecided.outcome = InitializationOutcome::kUndecided;
+  right.outcome = InitializationOutcome::kRight;
+  const auto row = [](std::vector<InitializationResult> starts) {
+    return MakeRunRow({}, RunRecord(), SequenceReport(), std::move(starts));
+  };
+  EXPECT_FALSE(row({undecided, undecided}).false_starts);
+  EXPECT_FALSE(row({undecided, undecided}).noticed);
+  EXPECT_EQ(row({undecided, undecided}).initializations.size(), 2u);
+  EXPECT_EQ(row({undecided, right}).false_starts, 0);
+  EXPECT_EQ(row({}).false_starts, 0) << "no map was initialized";
+}
+
 TEST(RunDistribution, WorstOfEquallyTrackedRunsHasTheLargerError) {
   EXPECT_EQ(WorstRun({Row(1, 0.9, 0.02), Row(2, 0.9, 0.05), Row(4, 1, 0.3)}), 1u);
 }
