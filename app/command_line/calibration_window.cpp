@@ -62,12 +62,13 @@ cv::Mat PaintCalibration(const CalibrationWindow::Shown& shown, const Coverage& 
   return drawn;
 }
 
-bool CalibrationWindow::Show(const Shown& shown, const Coverage& coverage) {
+CalibrationWindow::Answer CalibrationWindow::Show(const Shown& shown, const Coverage& coverage) {
   for (const ui::InputEvent& event : window_.PollEvents()) {
-    const bool key = event.kind == ui::InputEvent::Kind::kKey;
-    if (key && (event.key == "escape" || event.key == "enter" || event.key == "q")) return false;
+    if (event.kind != ui::InputEvent::Kind::kKey) continue;
+    if (event.key == "enter") return Answer::kFinish;
+    if (event.key == "escape" || event.key == "q") return Answer::kCancel;
   }
-  if (window_.IsClosing()) return false;
+  if (window_.IsClosing()) return Answer::kCancel;
   engine::TrackedFrame frame;
   frame.frame.image = PaintCalibration(shown, coverage);
   frame.state = engine::TrackingState::kDropped;  // Hides the hints for initialization and for a lost camera.
@@ -79,7 +80,7 @@ bool CalibrationWindow::Show(const Shown& shown, const Coverage& coverage) {
   const Eigen::Vector2i size = window_.FramebufferSize();
   renderer_.Present(std::max(1, size.x()), std::max(1, size.y()));
   window_.Show();
-  return true;
+  return Answer::kGoOn;
 }
 
 }  // namespace docent::app

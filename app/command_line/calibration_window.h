@@ -26,10 +26,16 @@ class CalibrationWindow {
     std::string message;
   };
 
+  enum class Answer {
+    kGoOn,
+    kFinish,  // Enter: the views are sufficient.
+    kCancel,  // Escape, q, or the window was closed.
+  };
+
   // Sizes in pixels. Throws Error when there is no display.
   CalibrationWindow(int width_px, int height_px) : window_("Docent - calibrate", width_px, height_px) {}
-  // Returns false when the person closed the window or pressed enter, escape or q.
-  bool Show(const Shown& shown, const Coverage& coverage);
+  // Returns what the person wants.
+  Answer Show(const Shown& shown, const Coverage& coverage);
 
  private:
   ui::Window window_;

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <cstdio>
+#include <filesystem>
 #include <optional>
+#include <system_error>
 #include <utility>
 
 #include "app/calibration/calibrate.h"
@@ -87,12 +89,16 @@ class ViewCollector {
     constexpr double kMaxFocalSigma = 0.001;
     if (!solution_ || solution_->FocalSigma() > kMaxFocalSigma)
       return text + "; tilt the board in all directions";
-    return text + "; these views are sufficient, press enter";
+    return text + "; these views are sufficient; press Enter";
   }
+  // Returns whether to go on. Throws Error if the person cancels.
   bool Present() {
+    using Answer = CalibrationWindow::Answer;
     if (options_.headless || shown_.image.empty()) return true;
     if (!window_) window_.emplace(size_.width, size_.height);
-    return window_->Show(shown_, *coverage_);
+    const Answer answer = window_->Show(shown_, *coverage_);
+    if (answer == Answer::kCancel) throw Error("The calibration was cancelled; nothing was written.");
+    return answer == Answer::kGoOn;
   }
 
   const CalibrateOptions& options_;
@@ -105,6 +111,21 @@ class ViewCollector {
   cv::Size size_;
   std::uint64_t images_ = 0;
 };
+
+// Collects views until they are sufficient and computes the calibration. Throws Error.
+Calibration CalibrateFrom(const CalibrateOptions& options, ViewCollector* collector, const SourceInfo& info,
+                          Verbosity verbosity) {
+  {
+    Progress progress(info.name, info.frame_count, verbosity);
+    collector->Run(&progress);
+  }
+  // A calibration from a part of the views must not replace an older, better one.
+  if (Interruption::requested()) throw Error("Interrupted; nothing was written.");
+  CalibrationOptions calibration_options;
+  calibration_options.lens = options.lens;
+  return Calibrate(collector->views(), collector->size().width, collector->size().height,
+                   calibration_options);
+}
 
 }  // namespace
 
@@ -121,18 +142,19 @@ void RunCalibrate(const CalibrateOptions& options, Verbosity verbosity) {
   CameraOptions camera = options.camera;
   camera.reconnect = !options.headless;
   const auto source = OpenCamera(options.source, camera);
-  ViewCollector collector(options, board, source.get());
-  {
-    Progress progress(source->info().name, source->info().frame_count, verbosity);
-    collector.Run(&progress);
-  }
-  // A calibration from a part of the views must not replace an older, better one.
-  if (Interruption::requested()) throw Error("Interrupted; nothing was written.");
-  CalibrationOptions calibration_options;
-  calibration_options.lens = options.lens;
-  const Calibration calibration =
-      Calibrate(collector.views(), collector.size().width, collector.size().height, calibration_options);
+  // A file that cannot be written must not cost the views that a person has collected.
+  if (std::filesystem::is_directory(options.output))
+    throw Error("'" + options.output.string() + "' is a folder, not a file.");
   CheckedFile file(options.output);
+  ViewCollector collector(options, board, source.get());
+  Calibration calibration;
+  try {
+    calibration = CalibrateFrom(options, &collector, source->info(), verbosity);
+  } catch (...) {
+    std::error_code ignored;
+    std::filesystem::remove(options.output.string() + ".part", ignored);
+    throw;
+  }
   file.Write(FormatCalibration(calibration, board));
   file.Close();
   if (verbosity == Verbosity::kQuiet) return;

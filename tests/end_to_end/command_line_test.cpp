@@ -249,6 +249,11 @@ TEST(CommandLine, CalibratesACameraFromAFolderOfImages) {
   const std::string before = ReadAll(output);
   ExpectErrorLine({"calibrate", "--camera", images, "--headless", "--output", output}, 1, "only 2 images");
   EXPECT_EQ(ReadAll(output), before);
+  EXPECT_FALSE(std::filesystem::exists(output + ".part"));
+  // Whether the file can be written is known before the views are collected.
+  for (const std::string& place : {(folder / "none/camera.yaml").string(), images})
+    ExpectErrorLine({"calibrate", "--camera", images, "--headless", "--output", place},
+                    images == place ? 2 : 1, place);
   ExpectErrorLine({"calibrate"}, 2, "--print");
   ExpectErrorLine({"calibrate", "--print", "x.pdf", "--board", "charuco:8"}, 2, "calibration board");
 }
