@@ -2,6 +2,7 @@
 #include <CLI/CLI.hpp>
 #include <memory>
 #include <utility>
+#include <vector>
 
 #include "app/command_line/hub_command.h"
 #include "app/command_line/program.h"
@@ -47,6 +48,13 @@ void AddAuthorCommand(CLI::App* program, Invocation* invocation,
   AddWhenLostOption(command, &options->when_lost, "new without a window, otherwise wait");
   command->callback([=, run = std::move(run)] {
     CheckRunArguments(options->run);
+    std::vector<OptionFile> outputs, inputs = InputFilesOf(options->run);
+    if (options->run.record) outputs.push_back({"--record", *options->run.record});
+    if (options->record_script) outputs.push_back({"--record-script", *options->record_script});
+    inputs.push_back({"--library", options->library});
+    if (options->script) inputs.push_back({"--script", *options->script});
+    if (options->target) inputs.push_back({"--target", *options->target});
+    CheckOutputFiles(outputs, inputs);
     options->hub = HubOfSession(options->hub, *invocation);
     if (options->target.has_value() != (options->target_width_m > 0))
       throw CLI::ValidationError("--target", "--target and --target-width must be given together");

@@ -2,6 +2,7 @@
 #include <CLI/CLI.hpp>
 #include <memory>
 #include <utility>
+#include <vector>
 
 #include "app/calibration/board.h"
 #include "app/command_line/program.h"
@@ -47,6 +48,13 @@ void AddCalibrateCommand(CLI::App* program, Invocation* invocation,
     if (options->source.empty() != options->output.empty()) {
       throw CLI::ValidationError("calibrate", "--camera and --output must be given together");
     }
+    std::vector<OptionFile> outputs, inputs;
+    if (!options->source.empty()) {
+      outputs.push_back({"--output", options->output});
+      inputs.push_back({"--camera", options->source});
+    }
+    if (options->print) outputs.push_back({"--print", *options->print});
+    CheckOutputFiles(outputs, inputs);
     invocation->run = [=] { run(*options, invocation->verbosity); };
   });
 }

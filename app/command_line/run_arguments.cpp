@@ -2,6 +2,8 @@
 #include "app/command_line/run_arguments.h"
 
 #include <CLI/CLI.hpp>
+#include <algorithm>
+#include <cstdint>
 #include <cstdlib>
 #include <filesystem>
 #include <map>
@@ -10,6 +12,7 @@
 #include "app/files/text_file.h"
 #include "content/language.h"
 #include "engine/base/error.h"
+#include "maps/storage/map_codec.h"
 
 namespace docent::app {
 
@@ -152,7 +155,9 @@ void AddRunArguments(CLI::App* command, const std::string& auto_calibration, Run
       ->allow_extra_args(false);
   command
       ->add_option("--calibration", run->cameras.calibrations,
-                   "Calibration file of each camera, in the same order; auto, or no file for a camera: " +
+                   "Calibration file of each camera, in the same order; without one, the calibration in the "
+                   "folder of a "
+                   "recording is used. auto, or where there is none: " +
                        auto_calibration)
       ->type_name("FILE|auto")
       ->allow_extra_args(false);
@@ -245,14 +250,46 @@ std::string LanguageOfEnvironment() {
 
 namespace {
 
-// Whether the file exists and has the images of a recording.
-bool IsVideoOf(const std::filesystem::path& file, const std::filesystem::path& recording) {
+// Whether both names are those of one file, which need not exist.
+bool IsSameFile(const std::filesystem::path& a, const std::filesystem::path& b) {
+  namespace fs = std::filesystem;
   std::error_code error;
-  return std::filesystem::equivalent(file, recording, error) ||
-         std::filesystem::equivalent(file, recording / "video.mp4", error);
+  if (fs::equivalent(a, b, error)) return true;
+  const fs::path whole_a = fs::weakly_canonical(a, error);
+  if (error) return false;
+  const fs::path whole_b = fs::weakly_canonical(b, error);
+  return !error && whole_a == whole_b;
 }
 
 }  // namespace
+
+void CheckOutputFiles(const std::vector<OptionFile>& outputs, const std::vector<OptionFile>& inputs) {
+  const auto replaces = [](const std::filesystem::path& file, const std::filesystem::path& read) {
+    std::error_code error;
+    return IsSameFile(file, read) ||
+           (std::filesystem::is_directory(read, error) && IsSameFile(file, read / "video.mp4"));
+  };
+  for (const OptionFile& output : outputs) {
+    for (const OptionFile& input : inputs) {
+      if (replaces(output.file, input.file)) {
+        throw CLI::ValidationError(output.option,
+                                   "would overwrite the file of " + input.option + " " + input.file.string());
+      }
+    }
+    for (const OptionFile& other : outputs) {
+      if (&other != &output && IsSameFile(output.file, other.file))
+        throw CLI::ValidationError(output.option, "is the same file as that of " + other.option);
+    }
+  }
+}
+
+std::vector<OptionFile> InputFilesOf(const RunArguments& run) {
+  std::vector<OptionFile> inputs;
+  for (const std::string& source : run.cameras.sources) inputs.push_back({"--camera", source});
+  for (const std::filesystem::path& calibration : run.cameras.calibrations)
+    inputs.push_back({"--calibration", calibration});
+  return inputs;
+}
 
 void CheckRunArguments(const RunArguments& run) {
   if (run.cameras.sources.size() > 2)
@@ -266,10 +303,19 @@ void CheckRunArguments(const RunArguments& run) {
   if (run.cameras.until > Timestamp{} && run.cameras.until <= run.cameras.from) {
     throw CLI::ValidationError("--until", "must be later than --from");
   }
-  for (const std::string& source : run.cameras.sources) {
-    if (run.record && IsVideoOf(*run.record, source))
-      throw CLI::ValidationError("--record", "would overwrite the images of --camera " + source);
+  if (run.record) CheckOutputFiles({{"--record", *run.record}}, InputFilesOf(run));
+}
+
+void CheckStorableSize(const engine::CameraModel& camera, const std::string& source) {
+  const int width = camera.width_px(), height = camera.height_px();
+  if (std::min(width, height) >= maps::kMinImageSidePx && std::max(width, height) <= maps::kMaxImageSidePx &&
+      std::int64_t{width} * height <= maps::kMaxImagePixels) {
+    return;
   }
+  throw Error("The images of " + source + " are " + std::to_string(width) + "x" + std::to_string(height) +
+              " pixels, but a library stores images with sides of " + std::to_string(maps::kMinImageSidePx) +
+              " to " + std::to_string(maps::kMaxImageSidePx) + " pixels and at most " +
+              std::to_string(maps::kMaxImagePixels) + " pixels.");
 }
 
 }  // namespace docent::app

@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <filesystem>
 #include <string>
+#include <vector>
 
 #include "app/command_line/options.h"
 
@@ -37,10 +39,22 @@ void AddLensOption(CLI::App* command, std::optional<engine::LensModel>* lens);
 // Adds the options that all subcommands with tracking share. `auto_calibration` is the help on
 // `--calibration auto`.
 void AddRunArguments(CLI::App* command, const std::string& auto_calibration, RunArguments* run);
+// The file of an option.
+struct OptionFile {
+  std::string option;
+  std::filesystem::path file;
+};
+// Throws CLI::ValidationError if an output would replace an input or another output, or the images of an
+// input that is a recording.
+void CheckOutputFiles(const std::vector<OptionFile>& outputs, const std::vector<OptionFile>& inputs);
+// The files of a run that are read: recordings and calibrations.
+std::vector<OptionFile> InputFilesOf(const RunArguments& run);
 // The language of the locale in the environment; empty if it names none.
 std::string LanguageOfEnvironment();
 // Checks combinations of options after parsing: the number of cameras and calibrations, a baseline without a
 // second camera, and --until before --from. Throws CLI::ValidationError.
 void CheckRunArguments(const RunArguments& run);
+// Throws Error if no library can store images of the camera's size. `source` is the name in the message.
+void CheckStorableSize(const engine::CameraModel& camera, const std::string& source);
 
 }  // namespace docent::app

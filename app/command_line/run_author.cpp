@@ -118,6 +118,8 @@ void RunAuthor(const AuthorOptions& options, Verbosity verbosity) {
   request.new_map_when_lost = options.when_lost.value_or(otherwise) == WhenLost::kNew;
   if (options.target) request.target = ReadTarget(*options.target, options.target_width_m);
   std::vector<CalibratedCamera> cameras = OpenArgumentCameras(options.run);
+  for (const CalibratedCamera& camera : cameras)
+    CheckStorableSize(*camera.model, "'" + camera.source->info().name + "'");
   if (!options.hub.empty()) request.hub = PulledHub(options);
   maps::Library library = OpenLibrary(options.library, maps::Access::kReadWrite, maps::CreateIfMissing::kYes);
   const maps::SessionLock lock(options.library, maps::SessionLockKind::kSession);

@@ -2,6 +2,7 @@
 #include <CLI/CLI.hpp>
 #include <memory>
 #include <utility>
+#include <vector>
 
 #include "app/command_line/hub_command.h"
 #include "app/command_line/program.h"
@@ -74,6 +75,15 @@ void AddTourCommand(CLI::App* program, Invocation* invocation,
                   &options->run);
   command->callback([=, run = std::move(run)] {
     CheckRunArguments(options->run);
+    if (options->run.record) {
+      std::vector<OptionFile> inputs = {{"--library", options->library}};
+      if (options->display) inputs.push_back({"--display", *options->display});
+      if (options->script) inputs.push_back({"--script", *options->script});
+      if (options->kiosk) inputs.push_back({"--kiosk", *options->kiosk});
+      CheckOutputFiles({{"--record", *options->run.record}}, inputs);
+    }
+    if (options->kiosk && options->run.headless)
+      throw CLI::ValidationError("--kiosk", "needs a window; remove --headless");
     options->hub = HubOfSession(options->hub, *invocation);
     if (options->glasses != options->display.has_value())
       throw CLI::ValidationError("--display", "goes together with --view glasses");

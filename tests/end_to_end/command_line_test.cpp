@@ -266,7 +266,7 @@ TEST(CommandLine, DoesNotRecordOverItsOwnImages) {
   for (const std::string& record : {walk, (folder / "sequence/../walk.mp4").string(), video}) {
     ExpectErrorLine({"author", "--library", library, "--camera", walk, "--camera",
                      (folder / "sequence").string(), "--record", record, "--headless"},
-                    2, "would overwrite the images");
+                    2, "would overwrite the file of --camera");
   }
   EXPECT_EQ(ReadTextFile(walk), "images");
   EXPECT_EQ(ReadTextFile(video), "images");

@@ -8,6 +8,9 @@
 #include <optional>
 
 #include "app/command_line/program.h"
+#include "app/command_line/run_arguments.h"
+#include "engine/mapping/calibration/self_calibration.h"
+#include "tests/support/error_of.h"
 
 namespace docent::app {
 namespace {
@@ -137,6 +140,53 @@ TEST(EvaluateOptions, RejectInvalidCounts) {
   }
   EXPECT_TRUE(rejected(" --jobs 2")) << "the pace is not lockstep";
   EXPECT_TRUE(rejected(" --seeds 2 --dump-frame 3"));
+}
+
+TEST(CalibrateOptions, RefuseToReplaceWhatIsRead) {
+  const auto accepted = [](const std::string& words) {
+    return Parse<CalibrateOptions>(AddCalibrateCommand, "calibrate " + words).has_value();
+  };
+  EXPECT_TRUE(accepted("--camera walk.mp4 --output camera.yaml --print board.pdf"));
+  EXPECT_FALSE(accepted("--camera walk.mp4 --output walk.mp4"));
+  EXPECT_FALSE(accepted("--camera walk.mp4 --output ./walk.mp4"));
+  EXPECT_FALSE(accepted("--camera walk.mp4 --output camera.yaml --print walk.mp4"));
+  EXPECT_FALSE(accepted("--camera walk.mp4 --output board.pdf --print board.pdf"));
+}
+
+TEST(AuthorOptions, RefuseToReplaceWhatIsRead) {
+  const auto accepted = [](const std::string& words) {
+    return Parse<AuthorOptions>(
+               AddAuthorCommand,
+               "author --library m.docent --camera c --calibration c.yaml --script s.txt --target t.png "
+               "--target-width 1 " +
+                   words)
+        .has_value();
+  };
+  EXPECT_TRUE(accepted("--record view.mp4 --record-script new.txt"));
+  for (const char* read : {"m.docent", "./m.docent", "c", "c.yaml", "s.txt", "t.png"}) {
+    EXPECT_FALSE(accepted("--record-script " + std::string(read))) << read;
+    EXPECT_FALSE(accepted("--record " + std::string(read))) << read;
+  }
+  EXPECT_FALSE(accepted("--record new.txt --record-script new.txt"));
+}
+
+TEST(AuthorOptions, RefuseACameraWhoseImagesNoLibraryCanStore) {
+  const auto error = [](int width, int height) {
+    const engine::CameraModel camera = engine::LensWithFieldOfView(width, height, 60);
+    return ErrorOf([&] { CheckStorableSize(camera, "'desk'"); });
+  };
+  EXPECT_EQ(error(64, 64), "");
+  EXPECT_EQ(error(8192, 8192), "");
+  EXPECT_EQ(error(16384, 4096), "");
+  EXPECT_THAT(error(640, 63), testing::AllOf(testing::HasSubstr("'desk'"), testing::HasSubstr("640x63")));
+  EXPECT_THAT(error(16385, 480), testing::HasSubstr("16385x480"));
+  EXPECT_THAT(error(16384, 8192), testing::HasSubstr("16384x8192"));
+}
+
+TEST(TourOptions, RefuseAKioskWithoutAWindow) {
+  EXPECT_TRUE(Parse<TourOptions>(AddTourCommand, "tour --library l --camera c --kiosk code"));
+  EXPECT_FALSE(Parse<TourOptions>(AddTourCommand, "tour --library l --camera c --kiosk code --headless"));
+  EXPECT_FALSE(Parse<TourOptions>(AddTourCommand, "tour --library l --camera c --record l"));
 }
 
 TEST(DemoOptions, RequireAnOutputFolderWhenHeadless) {
