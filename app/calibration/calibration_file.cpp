@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "app/calibration/calibration_file.h"
 
+#include <algorithm>
 #include <array>
 #include <cmath>
+#include <string_view>
 #include <vector>
 
 #include "app/calibration/yaml_reader.h"
@@ -94,20 +96,54 @@ CameraModel WithShutter(const YamlReader& file, const CameraModel& camera) {
   return camera.WithKnownReadout(readout_s);
 }
 
+constexpr std::initializer_list<const char*> kCoefficientLists = {
+    "distortion_coefficients", "distortion_coeffs", "dist_coeffs", "D", "d"};
+
+// Throws Error for a coefficient that the lens model does not have, because the lens would lose it.
+void RefuseOtherCoefficients(const YamlReader& file, std::initializer_list<const char*> used) {
+  for (const char* name : {"k1", "k2", "k3", "k4", "k5", "k6", "p1", "p2", "omega"}) {
+    const bool is_used = std::any_of(used.begin(), used.end(),
+                                     [name](const char* one) { return std::string_view(one) == name; });
+    if (!is_used && file.NumberOr(name, 0) != 0) {
+      throw Error(file.name() + ": the field '" + name +
+                  "' is no coefficient of the file's lens model or stands beside a list of them.");
+    }
+  }
+}
+
+// The lens model of a file with scalars. Some tools write `model: pinhole` beside `distortion_model`.
+LensModel OwnLens(const YamlReader& file) {
+  const std::string model = file.TextOr("model", "pinhole");
+  const LensModel lens = NeedLens(file, "model", model);
+  if (!file.Has("distortion_model")) return lens;
+  const LensModel distortion = NeedLens(file, "distortion_model", file.Text("distortion_model"));
+  if (model != "pinhole" && distortion != lens) {
+    throw Error(file.name() + ": the fields 'model' and 'distortion_model' name different lens models.");
+  }
+  return distortion;
+}
+
 CameraModel FromOwn(const YamlReader& file) {
-  const LensModel lens = NeedLens(file, "model", file.TextOr("model", "pinhole"));
+  const LensModel lens = OwnLens(file);
   const CameraModel::Intrinsics intrinsics{file.Integer("width"), file.Integer("height"), file.Number("fx"),
                                            file.Number("fy"),     file.Number("cx"),      file.Number("cy")};
+  if (const std::string list = file.FirstOf(kCoefficientLists); !list.empty()) {
+    RefuseOtherCoefficients(file, {});
+    return Checked(file, lens, intrinsics, NeedDistortion(file, list, lens, file.Numbers(list)));
+  }
   Distortion distortion{};
   switch (lens) {
     case LensModel::kRadialTangential:
+      RefuseOtherCoefficients(file, {"k1", "k2", "p1", "p2", "k3"});
       distortion = {file.NumberOr("k1", 0), file.NumberOr("k2", 0), file.NumberOr("p1", 0),
                     file.NumberOr("p2", 0), file.NumberOr("k3", 0)};
       break;
     case LensModel::kFov:
+      RefuseOtherCoefficients(file, {"omega"});
       distortion[0] = file.Number("omega");
       break;
     case LensModel::kKannalaBrandt:
+      RefuseOtherCoefficients(file, {"k1", "k2", "k3", "k4"});
       distortion = {file.Number("k1"), file.Number("k2"), file.Number("k3"), file.Number("k4"), 0};
       break;
   }
@@ -137,7 +173,7 @@ CameraModel FromMatrix(const YamlReader& file, const std::string& matrix_field) 
   } else if (file.NumberOr("fisheye_model", 0) != 0) {  // Written by OpenCV's calibration sample.
     lens = LensModel::kKannalaBrandt;
   }
-  const std::string field = need({"distortion_coefficients", "distortion_coeffs", "dist_coeffs", "D", "d"});
+  const std::string field = need(kCoefficientLists);
   return Checked(file, lens, intrinsics, NeedDistortion(file, field, lens, file.Numbers(field)));
 }
 

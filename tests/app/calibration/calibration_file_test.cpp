@@ -82,6 +82,28 @@ TEST(Calibration, ReadsTheOtherLensModels) {
                         {0.1, -0.02, 0.003, -0.0004, 0}));
 }
 
+TEST(Calibration, KeepsTheLensModelAndTheListOfCoefficientsBesideScalars) {
+  const std::string head = "width: 640\nheight: 480\nfx: 300\nfy: 301\ncx: 320\ncy: 240\n";
+  const CameraModel fisheye(LensModel::kKannalaBrandt, {640, 480, 300, 301, 320, 240},
+                            {0.1, -0.02, 0.003, -0.0004, 0});
+  const std::string coefficients = "k1: 0.1\nk2: -0.02\nk3: 0.003\nk4: -0.0004\n";
+  const auto read = [&](const std::string& text) { return ParseCalibration(head + text, "file"); };
+  EXPECT_EQ(read("distortion_model: equidistant\n" + coefficients), fisheye);
+  EXPECT_EQ(read("model: pinhole\ndistortion_model: equidistant\n" + coefficients), fisheye);
+  EXPECT_EQ(read("model: fisheye\ndistortion_coefficients: [0.1, -0.02, 0.003, -0.0004]\n"), fisheye);
+  EXPECT_EQ(read("distortion_coefficients: [-0.28, 0.07, 0.001, 0.002, 0.01]\n").distortion(),
+            (std::array<double, 5>{-0.28, 0.07, 0.001, 0.002, 0.01}));
+  EXPECT_EQ(read("k1: -0.28\nk4: 0\nomega: 0\n").distortion()[0], -0.28);
+  const auto error = [&](const std::string& text) { return ErrorOf([&] { read(text); }); };
+  EXPECT_THAT(error("model: fov\nomega: 0.9\ndistortion_model: equidistant\n"), HasSubstr("different"));
+  EXPECT_THAT(error("distortion_model: thin_prism\n"), HasSubstr("'thin_prism'"));
+  EXPECT_THAT(error("k1: 0.1\nk4: 0.01\n"), HasSubstr("'k4'"));
+  EXPECT_THAT(error("omega: 0.9\n"), HasSubstr("'omega'"));
+  EXPECT_THAT(error("model: fov\nomega: 0.9\nk1: 0.1\n"), HasSubstr("'k1'"));
+  EXPECT_THAT(error("model: kannala_brandt\np1: 0.1\n" + coefficients), HasSubstr("'p1'"));
+  EXPECT_THAT(error("k1: 0.1\ndistortion_coefficients: [0.2, 0, 0, 0]\n"), HasSubstr("'k1'"));
+}
+
 TEST(Calibration, ReadsTheExampleOfThePackage) {
   const engine::CameraModel camera = ReadCalibration(DOCENT_SOURCE_DIR "/packaging/camera.yaml");
   EXPECT_EQ(camera.width_px(), 640);
