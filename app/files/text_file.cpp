@@ -97,7 +97,10 @@ std::vector<std::string_view> SplitFields(std::string_view line, std::string_vie
 }
 
 std::optional<double> ParseNumber(std::string_view text) {
-  if (text.starts_with('+')) text.remove_prefix(1);  // from_chars does not accept a plus sign
+  if (text.starts_with('+')) {  // from_chars does not accept a plus sign
+    text.remove_prefix(1);
+    if (text.empty() || !(IsDigit(text[0]) || text[0] == '.')) return std::nullopt;
+  }
   double value = 0;
   const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
   if (error != std::errc{} || end != text.data() + text.size() || !std::isfinite(value)) return std::nullopt;

@@ -17,10 +17,12 @@ TEST(Seconds, AreExactToTheNanosecond) {
   EXPECT_EQ(ParseSeconds(".5"), Timestamp(500'000'000));
   EXPECT_EQ(ParseSeconds("0.0000000005"), Timestamp(1));
   EXPECT_EQ(ParseSeconds("1e-3"), Timestamp(1'000'000));
+  EXPECT_EQ(ParseSeconds("+.5"), Timestamp(500'000'000));
 }
 
 TEST(Seconds, AreRefusedWhenNotANumber) {
-  for (const char* text : {"", "-", ".", "1.2.3", "1,5", "nan", "inf", "1e300", "12s", " 1"}) {
+  for (const char* text :
+       {"", "-", ".", "1.2.3", "1,5", "nan", "inf", "1e300", "12s", " 1", "+-5", "++5", "+", "+nan"}) {
     EXPECT_FALSE(ParseSeconds(text)) << text;
   }
 }
@@ -56,6 +58,8 @@ TEST(Numbers, AreWrittenWithoutTheLocaleAndReadBack) {
   EXPECT_EQ(ParseNumber(FormatNumber(1.0 / 3, 17)), 1.0 / 3);
   EXPECT_FALSE(ParseNumber("nan"));
   EXPECT_FALSE(ParseNumber("1e999"));
+  EXPECT_EQ(ParseNumber("+5"), 5);
+  EXPECT_FALSE(ParseNumber("+-5"));
 }
 
 // The largest and smallest numbers, one that seventeen digits do not show as it was written, and random ones
