@@ -67,7 +67,9 @@ void Sensor::Apply(int frame, double time_s, cv::Mat* bgr) const {
       shade_q12_.empty() && noise_q12_.empty()) {
     return;
   }
-  const double exposure = Gain(time_s);
+  // With a greater gain every signal but 0 is clipped too, and the products below would not fit into 32 bits.
+  constexpr double kMaxGain = 1000;
+  const double exposure = std::min(Gain(time_s), kMaxGain);
   const int gain_q12 = static_cast<int>(std::lround(4096 * exposure));
   const std::vector<std::int32_t> deviations_q12 = NoiseOfSignals_q12(exposure);
   Random random(options_.seed ^ (0xD1B54A32D192ED03ull * (static_cast<std::uint64_t>(frame) + 1)));
@@ -78,7 +80,7 @@ void Sensor::Apply(int frame, double time_s, cv::Mat* bgr) const {
     if (!shade_q12_.empty()) {
       const std::uint16_t* shade = shade_q12_.data() + static_cast<std::size_t>(y) * bgr->cols;
       for (int x = 0; x < bgr->cols; ++x) {
-        const std::int32_t gain = (gain_q12 * shade[x]) >> 12;
+        const auto gain = static_cast<std::int32_t>((std::int64_t{gain_q12} * shade[x]) >> 12);
         gains[3 * x] = gains[3 * x + 1] = gains[3 * x + 2] = gain;
       }
     }

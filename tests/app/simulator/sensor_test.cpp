@@ -48,6 +48,25 @@ TEST(Sensor, VignettingDarkensTheCornersButNotTheCentre) {
   EXPECT_NEAR(image.at<cv::Vec3b>(48, 64)[2], 72, 1);
 }
 
+TEST(Sensor, ClipsWhateverTheGain) {
+  for (const double gain : {150.0, 3e3, 1e6}) {
+    for (const double vignetting : {0.0, 0.4}) {
+      for (const double noise : {0.0, 2.0}) {
+        const Sensor sensor({.size = {65, 49},
+                             .vignetting = vignetting,
+                             .noise_sigma = noise,
+                             .gain = gain,
+                             .gain_noise_sigma = noise / 10});
+        cv::Mat image = Grey({65, 49});
+        sensor.Apply(0, 0, &image);
+        double least = 0;
+        cv::minMaxLoc(image.reshape(1), &least);
+        EXPECT_EQ(least, 255) << gain << " " << vignetting << " " << noise;
+      }
+    }
+  }
+}
+
 TEST(Sensor, ExposureDriftsSlowly) {
   const Sensor sensor({.size = {32, 32}, .exposure_drift = 0.1});
   double lowest = 2, highest = 0, largest_step = 0;
