@@ -72,6 +72,8 @@ CameraModel WrongCalibration(const CameraModel& lens, double focal_error, double
   if (distortion_error_px != 0) distortion[0] += CoefficientChange(lens, distortion_error_px);
   intrinsics.fx *= 1 + focal_error;
   intrinsics.fy *= 1 + focal_error;
+  if (const auto problem = CameraModel::Validate(lens.lens(), intrinsics, distortion))
+    throw Error("With these errors, the simulated calibration is invalid: " + *problem);
   return {lens.lens(), intrinsics, distortion};
 }
 

@@ -8,7 +8,8 @@ namespace docent::app {
 // Simulates an inaccurate calibration of a lens. Focal lengths are multiplied by 1 + focal_error. The first
 // distortion coefficient is changed until the RMS displacement of rays over the image is
 // |distortion_error_px| (measured with the true focal length); the sign of distortion_error_px is the sign of
-// the change. Throws docent::Error when no coefficient achieves that.
+// the change. Throws docent::Error when no coefficient achieves that, or
+// when no calibration file could hold the result.
 engine::CameraModel WrongCalibration(const engine::CameraModel& lens, double focal_error,
                                      double distortion_error_px);
 

@@ -172,6 +172,12 @@ TEST(CalibrationError, DisplacesRaysByTheGivenPixels) {
   }
 }
 
+TEST(CalibrationError, IsRefusedIfNoFileCouldHoldTheCalibration) {
+  const CameraModel lens(LensModel::kRadialTangential, {640, 480, 400, 401, 321, 238}, {-0.3, 0, 0, 0, 0});
+  ASSERT_FALSE(CameraModel::Validate(lens.lens(), lens.intrinsics(), lens.distortion()));
+  EXPECT_THAT(ErrorOf([&] { WrongCalibration(lens, -0.5, 0); }), HasSubstr("calibration is invalid"));
+}
+
 TEST(FrameDrops, DropTheGivenRatioSinglyAndInBursts) {
   for (const double share : {0.05, 0.3, 0.8}) {
     constexpr int kFrames = 100000;
