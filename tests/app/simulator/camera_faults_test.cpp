@@ -12,6 +12,7 @@
 #include <utility>
 #include <vector>
 
+#include "app/files/text_file.h"
 #include "app/simulator/calibration_error.h"
 #include "app/simulator/exposure_jumps.h"
 #include "app/simulator/frame_drops.h"
@@ -373,6 +374,18 @@ TEST(NamedOptions, FollowTheSceneNameAfterCommas) {
   EXPECT_EQ(options.rounds, 2);
   EXPECT_EQ(simulation->scene_name(), "museum");
   EXPECT_EQ(simulation->places().size(), 2u);
+}
+
+TEST(NamedOptions, SayTheirDefaultsInTheHelp) {
+  const SimulationOptions defaults;
+  for (const auto& [name, value] : {std::pair<std::string, double>{"fps", defaults.frame_rate_hz},
+                                    {"noise", defaults.noise_sigma},
+                                    {"exposure", 1000 * defaults.exposure_s}}) {
+    for (const NamedOption& option : NamedOptions()) {
+      if (option.name == name)
+        EXPECT_THAT(option.meaning, HasSubstr("(default " + FormatNumber(value, 3) + ")")) << name;
+    }
+  }
 }
 
 TEST(NamedOptions, ReportWhatIsWrong) {
