@@ -51,10 +51,13 @@ class ClippedSource : public FrameSource {
     return false;
   }
 
-  // Images long before the interval are not decoded or rendered; gaps are shorter than this.
+  // Images before the interval are not decoded or rendered, or only those long before it if the time of the
+  // next one is not known.
   bool SkipsNext() const {
-    constexpr Timestamp kGap = std::chrono::seconds(1);
-    return !info_.live && first_ && last_ + kGap < from_;
+    if (info_.live || !first_) return false;
+    if (const std::optional<Timestamp> next = source_->NextTime()) return *next - *first_ < from_;
+    const Timestamp gap = std::max<Timestamp>(std::chrono::seconds(1), FromSeconds(2 / info_.nominal_fps));
+    return last_ + gap < from_;
   }
 
   [[noreturn]] void RefuseStart(Timestamp last) const {

@@ -339,6 +339,15 @@ TEST(ClippedSource, DoesNotDecodeWhatIsLongBeforeTheInterval) {
   EXPECT_EQ(more, 4);
 }
 
+TEST_F(Cameras, DeliverTheFirstImageOfAnIntervalWhateverTheirRate) {
+  for (int i = 0; i < 4; ++i) WritePng(folder_ / ("rgb/" + std::to_string(i) + ".png"), Numbered(i));
+  folder_.Write("rgb.txt", "10 rgb/0.png\n15 rgb/1.png\n20 rgb/2.png\n25 rgb/3.png\n");
+  const auto frames =
+      ReadFrames(ClipSource(OpenCamera(folder_.path().string()), std::chrono::seconds(8), {}).get());
+  ASSERT_EQ(frames.size(), 2u);
+  EXPECT_EQ(frames[0].time, std::chrono::seconds(20));
+}
+
 TEST_F(Cameras, RefuseToBeClippedBeyondTheirEnd) {
   MakeTum();  // 0.825 s long
   const auto clip = [&](const std::string& camera, int from_ms, int until_ms = 0) {
