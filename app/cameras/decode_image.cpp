@@ -31,16 +31,12 @@ bool IsCutOff(std::span<const std::uint8_t> bytes) {
   return false;
 }
 
-}  // namespace
-
-cv::Mat DecodeImage(std::span<const std::uint8_t> bytes, const std::string& name) {
-  if (bytes.empty()) throw Error(name + " is empty; it contains no image.");
-  if (IsCutOff(bytes)) throw Error(name + " is truncated before the end of its image.");
+cv::Mat Decode(std::span<const std::uint8_t> bytes, const std::string& name, int flags) {
   cv::Mat image;
   try {
     const cv::Mat wrapped(1, static_cast<int>(bytes.size()), CV_8UC1,
                           const_cast<std::uint8_t*>(bytes.data()));
-    image = cv::imdecode(wrapped, cv::IMREAD_ANYCOLOR);
+    image = cv::imdecode(wrapped, flags);
   } catch (const cv::Exception& error) {
     throw Error(name + " cannot be decoded as an image: " + error.err + ".");
   }
@@ -48,9 +44,49 @@ cv::Mat DecodeImage(std::span<const std::uint8_t> bytes, const std::string& name
   return image;
 }
 
-cv::Mat ReadImage(const std::filesystem::path& path, std::vector<std::uint8_t>* buffer) {
+// 8, 10, 12, 14 or 16, which the largest value of a CV_16U image needs.
+int BitsOf(const cv::Mat& image) {
+  double largest = 0;
+  cv::minMaxLoc(image.reshape(1), nullptr, &largest);
+  int bits = 8;
+  while (largest >= (1 << bits)) bits += 2;
+  return bits;
+}
+
+// The upper 8 of `bits` bits of a CV_16U image.
+cv::Mat UpperByteOf(const cv::Mat& image, int bits) {
+  cv::Mat upper(image.size(), CV_MAKETYPE(CV_8U, image.channels()));
+  for (int y = 0; y < image.rows; ++y) {
+    const auto* const from = image.ptr<std::uint16_t>(y);
+    auto* const to = upper.ptr<std::uint8_t>(y);
+    for (int i = 0; i < image.cols * image.channels(); ++i)
+      to[i] = static_cast<std::uint8_t>(from[i] >> (bits - 8));
+  }
+  return upper;
+}
+
+}  // namespace
+
+cv::Mat DecodeImage(std::span<const std::uint8_t> bytes, const std::string& name, int* bits) {
+  if (bytes.empty()) throw Error(name + " is empty; it contains no image.");
+  if (IsCutOff(bytes)) throw Error(name + " is truncated before the end of its image.");
+  int bits_of_image = 0;
+  if (bits == nullptr) bits = &bits_of_image;
+  constexpr int kAllBits = 16;
+  if (*bits < kAllBits) {
+    const cv::Mat image = Decode(bytes, name, cv::IMREAD_ANYCOLOR | cv::IMREAD_ANYDEPTH);
+    if (image.depth() == CV_8U) return image;
+    if (image.depth() == CV_16U) {
+      *bits = std::max(*bits, BitsOf(image));
+      if (*bits < kAllBits) return UpperByteOf(image, *bits);
+    }
+  }
+  return Decode(bytes, name, cv::IMREAD_ANYCOLOR);
+}
+
+cv::Mat ReadImage(const std::filesystem::path& path, std::vector<std::uint8_t>* buffer, int* bits) {
   ReadBytes(path, kMaxImageBytes, buffer);
-  return DecodeImage(*buffer, "'" + path.string() + "'");
+  return DecodeImage(*buffer, "'" + path.string() + "'", bits);
 }
 
 }  // namespace docent::app

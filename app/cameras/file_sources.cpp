@@ -173,7 +173,7 @@ class ImageListSource : public FrameSource {
     const TimedPath& next = images_[index_];
     cv::Mat image;
     try {
-      image = ReadImage(next.path, &buffer_);
+      image = ReadImage(next.path, &buffer_, &bits_);
       if (size_.area() == 0) size_ = image.size();
       if (image.size() != size_) {
         throw Error(Quoted(next.path) + " is " + std::to_string(image.cols) + "x" +
@@ -204,6 +204,7 @@ class ImageListSource : public FrameSource {
  private:
   std::vector<TimedPath> images_;
   std::vector<std::uint8_t> buffer_;
+  int bits_ = 0;  // Of 16-bit images; see DecodeImage.
   cv::Size size_;
   std::size_t index_ = 0;
 };

@@ -15,14 +15,15 @@ std::unique_ptr<FrameSource> OpenCamera(const std::string& source, const CameraO
   namespace fs = std::filesystem;
   if (source.empty())
     throw Error("The camera's name is empty; give a device, a video, a folder or sim:SCENE.");
-  if (source.starts_with("/dev/")) {
+  std::error_code error;
+  const fs::file_status status = fs::status(source, error);
+  const bool is_file = fs::is_directory(status) || fs::is_regular_file(status);  // Also below /dev/shm.
+  if (source.starts_with("/dev/") && !is_file) {
     auto device = OpenDevice(source, options);
     device->SetHead(OpenDeviceHead(MakeDeviceSystem(), source));
     return device;
   }
   if (source.starts_with("sim:")) return OpenSimulation(source.substr(4), options);
-  std::error_code error;
-  const fs::file_status status = fs::status(source, error);
   if (fs::is_directory(status)) return OpenFolder(source, options);
   if (fs::is_regular_file(status)) return OpenVideo(source);
   throw Error("There is no camera, video or folder '" + source + "'.");

@@ -102,6 +102,29 @@ std::vector<fs::path> NumberedImages(const fs::path& folder) {
   return images;
 }
 
+// The name with '#' for each run of digits, and the ending in lower case.
+std::string PatternOf(const fs::path& path) {
+  std::string pattern;
+  for (const char c : path.stem().string()) {
+    const bool digit = std::isdigit(static_cast<unsigned char>(c)) != 0;
+    if (!digit || !pattern.ends_with('#')) pattern += digit ? '#' : c;
+  }
+  for (const char c : path.extension().string())
+    pattern += static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+  return pattern;
+}
+
+// Throws Error if the images are not those of one sequence, as colour and depth images, or left and right
+// ones, side by side.
+void CheckOneSequence(const fs::path& folder, const std::vector<fs::path>& images) {
+  for (const fs::path& image : images) {
+    if (PatternOf(image) == PatternOf(images.front())) continue;
+    throw Error("The folder '" + folder.string() + "' contains numbered images of several kinds, such as '" +
+                images.front().filename().string() + "' and '" + image.filename().string() +
+                "'; a folder must contain the images of one sequence only.");
+  }
+}
+
 }  // namespace
 
 std::optional<fs::path> FindEurocCamera(const fs::path& folder) {
@@ -166,7 +189,9 @@ std::vector<TimedPath> ReadEurocList(const fs::path& folder) {
 
 std::vector<TimedPath> ListNumberedImages(const fs::path& folder, double fps) {
   std::vector<TimedPath> images;
-  for (fs::path& path : NumberedImages(folder)) {
+  std::vector<fs::path> numbered = NumberedImages(folder);
+  CheckOneSequence(folder, numbered);
+  for (fs::path& path : numbered) {
     const auto time = FromSeconds(static_cast<double>(images.size()) / fps);
     images.push_back({time, std::move(path)});
   }

@@ -23,7 +23,7 @@ enum class SequenceLayout {
   kEuroc,           // mav0/cam0, cam0 or the folder itself: data.csv `nanoseconds,file`, images in data/.
   kTimedVideo,      // video.mp4 with timestamps.txt.
   kVideo,           // video.mp4 alone, with the timestamps of the container.
-  kNumberedImages,  // Images in the order of the numbers in their names.
+  kNumberedImages,  // Images in the order of the numbers in their names, which are alike but for these.
 };
 
 // The layout of the folder, or empty when it contains no sequence.

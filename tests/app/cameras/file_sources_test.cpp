@@ -109,6 +109,65 @@ TEST_F(Cameras, ReadNumberedImagesInNumericalOrder) {
   }
 }
 
+TEST_F(Cameras, RefuseNumberedImagesOfSeveralKinds) {
+  for (const auto& [one, other] : {std::pair{"frame-000000.color.png", "frame-000000.depth.png"},
+                                   {"left000.png", "right000.png"},
+                                   {"1.jpg", "1.png"}}) {
+    const TemporaryFolder folder;
+    WritePng(folder / one, Numbered(1));
+    WritePng(folder / other, Numbered(2));
+    EXPECT_THAT(ErrorOf([&] { OpenCamera(folder.path().string()); }),
+                AllOf(HasSubstr("several kinds"), HasSubstr(one), HasSubstr(other)));
+  }
+  WritePng(folder_ / "img9.png", Numbered(1));
+  WritePng(folder_ / "img10.png", Numbered(2));
+  std::filesystem::rename(folder_ / "img10.png", folder_ / "img10.PNG");
+  EXPECT_EQ(ReadFrames(OpenCamera(folder_.path().string()).get()).size(), 2u);
+}
+
+TEST_F(Cameras, KeepAllBitsThatSixteenBitImagesUse) {
+  const auto write = [&](const std::string& name, int type, double value) {
+    cv::Mat image(kFileHeight, kFileWidth, type, cv::Scalar::all(value));
+    image.ptr<std::uint16_t>()[0] = 0;
+    WritePng(folder_ / name, image);
+  };
+  const auto levels = [&] {
+    std::vector<int> found;
+    for (const engine::Frame& frame : ReadFrames(OpenCamera(folder_.path().string()).get())) {
+      EXPECT_EQ(frame.image.depth(), CV_8U);
+      EXPECT_EQ(frame.image.ptr()[0], 0);
+      found.push_back(frame.image.ptr(3)[5]);
+    }
+    return found;
+  };
+  write("1.png", CV_16UC1, 200 * 16 + 7);
+  write("2.png", CV_16UC1, 40 * 16 + 15);
+  EXPECT_THAT(levels(), ::testing::ElementsAre(200, 40)) << "12 bits";
+  write("1.png", CV_16UC1, 900);
+  write("2.png", CV_16UC1, 40 * 4);
+  EXPECT_THAT(levels(), ::testing::ElementsAre(225, 40)) << "10 bits";
+  write("1.png", CV_16UC3, 200 * 256 + 255);
+  write("2.png", CV_16UC3, 3 * 256 + 200);
+  EXPECT_THAT(levels(), ::testing::ElementsAre(200, 3)) << "16 bits";
+  write("1.png", CV_16UC1, 5);
+  write("2.png", CV_16UC1, 200 * 16);
+  write("3.png", CV_16UC1, 20 * 16);
+  EXPECT_THAT(levels(), ::testing::ElementsAre(5, 200, 20)) << "the first image is dark";
+}
+
+TEST_F(Cameras, OpenFilesBelowDev) {
+  std::string pattern = "/dev/shm/docent-test-XXXXXX";
+  if (mkdtemp(pattern.data()) == nullptr) GTEST_SKIP() << "no folder can be made in /dev/shm";
+  const std::filesystem::path folder = pattern;
+  WritePng(folder / "1.png", Numbered(1));
+  std::size_t frames = 0;
+  const std::string error = ErrorOf([&] { frames = ReadFrames(OpenCamera(pattern).get()).size(); });
+  std::error_code ignored;
+  std::filesystem::remove_all(folder, ignored);
+  EXPECT_EQ(error, "");
+  EXPECT_EQ(frames, 1u);
+}
+
 TEST_F(Cameras, UseTheTimestampListOfAVideo) {
   WriteVideo(folder_ / "video.mp4", 4);
   folder_.Write("timestamps.txt", "# seconds\n10.000000\n10.033333\n10.5\n11\n");
