@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "app/evaluation/json_report.h"
 
+#include <algorithm>
 #include <cmath>
 #include <cstdio>
 #include <nlohmann/json.hpp>
@@ -214,6 +215,10 @@ std::string FormatSummary(const SequenceReport& report) {
   }
   if (report.ate_rmse_m) text += ", ATE " + Format("%.1f cm", *report.ate_rmse_m * 100);
   if (report.rotation_rmse_deg) text += ", rotation " + Format("%.2f deg", *report.rotation_rmse_deg);
+  const auto kept_maps = std::count_if(report.maps.begin(), report.maps.end(),
+                                       [](const MapResult& map) { return !map.discarded && map.frames > 0; });
+  if ((report.ate_rmse_m || report.rotation_rmse_deg) && kept_maps > 1)
+    text += " (of the largest of " + std::to_string(kept_maps) + " maps)";
   text += ", " + Format("%.1f ms", report.tracking_median_ms) +
           " per frame (95 %: " + Format("%.1f ms", report.tracking_p95_ms) + ")";
   if (report.discarded_frames > 0) {

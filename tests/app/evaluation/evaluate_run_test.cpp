@@ -224,6 +224,8 @@ TEST(Evaluation, AlignsEveryMapSeparatelyAndReportsTheLargest) {
   EXPECT_THAT(report.ate_rmse_m, Optional(DoubleNear(0, 1e-9)));
   EXPECT_THAT(report.maps[1].ate_rmse_m, Optional(DoubleNear(0.1, 0.01)));
   ASSERT_EQ(report.segments.size(), 2u);
+  EXPECT_THAT(FormatSummary(report), HasSubstr("deg (of the largest of 2 maps), "));
+  EXPECT_THAT(FormatSummary(EvaluateRun(PerfectRun(truth), truth, {})), Not(HasSubstr("largest")));
   EXPECT_EQ(report.segments[1].label, "visit");
   EXPECT_EQ(report.segments[1].frames, 40);
   EXPECT_EQ(report.segments[1].tracked_ratio, 1);
