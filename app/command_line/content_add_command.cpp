@@ -63,7 +63,6 @@ content::Entity NewFromFile(const AddOptions& options, const Target& target) {
   content::Entity entity;
   switch (KindOfFile(options.file)) {
     case content::AssetKind::kSound: {
-      if (options.caption.empty()) throw Error("a sound needs a caption; give it with --caption.");
       const auto sound = std::make_shared<content::Asset>(content::ImportSound(options.file));
       entity = NewSound(sound, *options.position, target.distance);
       entity.sound.caption = options.caption;
@@ -106,9 +105,9 @@ content::Entity NewLabelFrom(const AddOptions& options, const Target& target) {
   return entity;
 }
 
-// The points have the form of those of the script command `trail`.
-content::Entity NewTrailFrom(const AddOptions& options, const Target& target) {
-  const auto parsed = ParseScript("0 trail at " + options.trail, "--trail");
+// The points of --trail, which have the form of those of the script command `trail`. Throws Error.
+std::vector<Eigen::Vector3d> TrailPoints(const std::string& text) {
+  const auto parsed = ParseScript("0 trail at " + text, "--trail");
   const auto* const trail = parsed.size() == 1 ? std::get_if<PlaceTrail>(&parsed.front().command) : nullptr;
   if (trail == nullptr) throw Error("--trail: expected one list of points.");
   std::vector<Eigen::Vector3d> points;
@@ -116,25 +115,34 @@ content::Entity NewTrailFrom(const AddOptions& options, const Target& target) {
     if (point.pixel) throw Error("--trail: a saved map has no image with this pixel; give X Y Z instead.");
     points.push_back(point.in_map);
   }
+  return points;
+}
+
+content::Entity NewTrailFrom(const AddOptions& options, const Target& target) {
   content::Entity entity =
-      NewTrail(std::move(points), Eigen::Vector3d::Zero(), target.axes.up, target.distance);
+      NewTrail(TrailPoints(options.trail), Eigen::Vector3d::Zero(), target.axes.up, target.distance);
   if (options.width) entity.trail.width = *options.width;
   return entity;
 }
 
-// The form is that of the script command `occluder`.
-content::Entity NewOccluderFrom(const AddOptions& options, const Target& target) {
-  const auto parsed = ParseScript("0 occluder " + options.occluder, "--occluder");
+// The shape of --occluder, which has the form of that of the script command `occluder`. Throws Error.
+PlaceOccluder OccluderShape(const std::string& text) {
+  const auto parsed = ParseScript("0 occluder " + text, "--occluder");
   const auto* const command =
       parsed.size() == 1 ? std::get_if<PlaceOccluder>(&parsed.front().command) : nullptr;
   if (command == nullptr) throw Error("--occluder: expected one shape.");
-  std::vector<content::SurfaceHit> places;
   for (const MapPoint& point : command->points) {
     if (point.pixel) throw Error("--occluder: a saved map has no image with this pixel; give X Y Z instead.");
-    places.push_back({point.in_map, target.axes.up});
   }
+  return *command;
+}
+
+content::Entity NewOccluderFrom(const AddOptions& options, const Target& target) {
+  const PlaceOccluder command = OccluderShape(options.occluder);
+  std::vector<content::SurfaceHit> places;
+  for (const MapPoint& point : command.points) places.push_back({point.in_map, target.axes.up});
   const Eigen::Vector3d viewer = places.front().point - target.distance * target.axes.ahead;
-  return NewOccluder(*command, places, viewer, target.axes.up);
+  return NewOccluder(command, places, viewer, target.axes.up);
 }
 
 std::string FreeNameFor(const content::Scene& scene, const content::Entity& entity,
@@ -294,6 +302,14 @@ void AddContentAddCommand(CLI::App* group, Invocation* invocation) {
     if (options->file.empty() && options->signpost.empty() && options->label.empty() && !has_place)
       throw CLI::RequiredError("FILE, --signpost TEXT, --label TEXT, --trail POINTS or --occluder SHAPE");
     if (!options->position && !has_place) throw CLI::RequiredError("--at");
+    if (KindOfFile(options->file) == content::AssetKind::kSound && options->caption.empty())
+      throw CLI::ValidationError("--caption", "a sound needs a caption");
+    try {
+      if (!options->trail.empty()) TrailPoints(options->trail);
+      if (!options->occluder.empty()) OccluderShape(options->occluder);
+    } catch (const Error& error) {
+      throw CLI::ValidationError(error.what());
+    }
     invocation->run = [=] { Add(*options, invocation->verbosity); };
   });
 }

@@ -166,17 +166,22 @@ class StoredEdits {
   const bool find_directions_;
 };
 
-void RunEdit(const EditOptions& options) {
+// The commands that the options stand for. Throws Error if the options are wrong, whatever the library holds.
+std::vector<Command> CheckedCommandsFor(const EditOptions& options) {
   if (options.NamesOne() && options.names.size() > 1)
     throw Error(
         "--transform, --align, --bend, --text, --offset, --size, --direction, --find-direction, --extend and "
-        "--rename change one object, not several.");
-  const std::vector<Command> commands = CommandsFor(options);
-  if (commands.empty()) throw Error("No change is given; see docent content edit --help.");
+        "--rename change one object, not several");
+  std::vector<Command> commands = CommandsFor(options);
+  if (commands.empty()) throw Error("No change is given");
   for (const Command& command : commands) {
     if (const std::string problem = Validate(command); !problem.empty())
-      throw Error(FormatCommand(command) + ": " + problem + ".");
+      throw Error(FormatCommand(command) + ": " + problem);
   }
+  return commands;
+}
+
+void RunEdit(const EditOptions& options, const std::vector<Command>& commands) {
   maps::Library library = OpenLibrary(options.library, maps::Access::kReadWrite);
   const maps::SessionLock lock(options.library, maps::SessionLockKind::kReplace);
   const maps::MapInfo map = library.FindByName(options.map);
@@ -293,7 +298,13 @@ void AddContentEditCommand(CLI::App* group, Invocation* invocation) {
   AddLibraryOption(edit, LibraryUse::kChange, &options->library, invocation);
   AddPoseOptions(edit, options.get());
   AddPropertyOptions(edit, options.get());
-  edit->callback([=] { invocation->run = [=] { RunEdit(*options); }; });
+  edit->callback([=] {
+    try {
+      invocation->run = [=, commands = CheckedCommandsFor(*options)] { RunEdit(*options, commands); };
+    } catch (const Error& error) {
+      throw CLI::ValidationError(error.what());
+    }
+  });
 }
 
 }  // namespace docent::app

@@ -100,16 +100,23 @@ std::string MeshFile(const maps::Library& library, std::uint64_t key, const std:
   return maps::MakeMeshPly(mesh->mesh);
 }
 
+// Throws CLI::ValidationError for a file type that is not written.
+void CheckExportType(const ExchangeOptions& options) {
+  const std::string kind = options.output.extension().string();
+  if (!kind.empty() && kind != ".docent" && kind != ".ply" && kind != ".png") {
+    throw CLI::ValidationError(
+        "--output",
+        "'" + options.output.string() +
+            "' has an unknown file type; use a .docent, .ply or .png file, or a folder for COLMAP's files");
+  }
+  if (options.as_mesh && kind != ".ply")
+    throw CLI::ValidationError("--mesh", "a mesh is written to a .ply file");
+}
+
 void Export(const ExchangeOptions& options, Verbosity verbosity) {
   const maps::Library library = OpenLibrary(options.library, maps::Access::kReadOnly);
   const std::uint64_t key = library.FindByName(options.name).key;
   const std::string kind = options.output.extension().string();
-  if (!kind.empty() && kind != ".docent" && kind != ".ply" && kind != ".png") {
-    throw Error(
-        "'" + options.output.string() +
-        "' has an unknown file type; use a .docent, .ply or .png file, or a folder for COLMAP's files.");
-  }
-  if (options.as_mesh && kind != ".ply") throw Error("A mesh is written to a .ply file.");
   std::error_code error;
   if (fs::exists(options.output, error) && !(kind.empty() && fs::is_empty(options.output, error)))
     throw Error("'" + options.output.string() + "' already exists; choose a new name.");
@@ -323,6 +330,10 @@ void AddMapsExchangeCommands(CLI::App* group, Invocation* invocation) {
                    "A .docent library, a .ply point cloud, a .png image from above, or a folder for COLMAP's "
                    "text model")
       ->required();
+  command->callback([=] {
+    CheckExportType(*options);
+    invocation->run = [=] { Export(*options, invocation->verbosity); };
+  });
   add("import", LibraryUse::kChange,
       "Add the maps and tours of another library; duplicate names get a number",
       "docent maps import desk.docent --library museum.docent", Import)

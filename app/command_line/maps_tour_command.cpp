@@ -124,8 +124,6 @@ void CreateTour(const MapsTourOptions& options) {
 }
 
 void EditTour(const MapsTourOptions& options) {
-  if (options.stops.empty() && !options.language && !options.minutes)
-    throw Error("Nothing to change was given; see docent maps tour edit --help.");
   maps::Library library = OpenLibrary(options.library, maps::Access::kReadWrite);
   maps::Tour given;
   TakeOptions(options, library, &given);
@@ -218,6 +216,11 @@ void AddMapsTourCommands(CLI::App* group, Invocation* invocation) {
   edit->add_flag_callback(
           "--no-minutes", [=] { options->minutes = 0; }, "Do not say how long the tour takes")
       ->excludes("--minutes");
+  edit->callback([=] {
+    if (options->stops.empty() && !options->language && !options->minutes)
+      throw CLI::ValidationError("Nothing to change was given");
+    invocation->run = [=] { EditTour(*options); };
+  });
   add_name(add("rename", LibraryUse::kChange, "Rename a tour",
                "docent maps tour rename Highlights Masterpieces --library museum.docent", RenameTour))
       ->add_option("NEW_NAME", options->new_name, "New name of the tour")

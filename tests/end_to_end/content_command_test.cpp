@@ -115,22 +115,26 @@ TEST(ContentCommand, EditsTheContentOfASavedMap) {
   EXPECT_EQ(edited({"exhibit", "--unbend"}).Find("exhibit")->model.warp, nullptr);
 
   const std::string before = RunDocent({"content", "list", "--json", "--library", path}).output;
-  ExpectErrorLine(run("edit", {"exhibit"}), 1, "No change is given");
+  ExpectErrorLine(run("edit", {"exhibit"}), 2, "No change is given");
+  ExpectErrorLine(run("add", {"bell.wav", "--at", "0", "0", "2"}), 2, "a sound needs a caption");
+  ExpectErrorLine(run("add", {"--trail", "0 1"}), 2, "--trail");
+  ExpectErrorLine(run("add", {"--trail", "0 1 1, pixel 1 1"}), 2, "no image with this pixel");
+  ExpectErrorLine(run("add", {"--occluder", "ball at 0 0 1"}), 2, "--occluder");
   ExpectErrorLine(run("edit", {"fox", "--hide"}), 1, "no 'fox'");
   ExpectErrorLine(run("edit", {"exhibit", "--text", "x"}), 1, "is a model");
-  ExpectErrorLine(run("edit", {"exhibit", "exhibit-2", "--rename", "x"}), 1, "not several");
+  ExpectErrorLine(run("edit", {"exhibit", "exhibit-2", "--rename", "x"}), 2, "not several");
   ExpectErrorLine(run("edit", {"kiosk sign", "--to", "Desk"}), 1, "its own map");
   ExpectErrorLine(run("edit", {"kiosk sign", "--to", "Attic"}), 1, "Attic");
-  ExpectErrorLine(run("edit", {"kiosk sign", "--direction", "0", "0", "0"}), 1, "the direction is too short");
+  ExpectErrorLine(run("edit", {"kiosk sign", "--direction", "0", "0", "0"}), 2, "the direction is too short");
   ExpectErrorLine(run("edit", {"kiosk sign", "--find-direction"}), 1, "'kiosk sign' leads to no map");
   ExpectErrorLine(run("edit", {"exhibit", "--direction", "0", "0", "1"}), 1, "a model, which has no arrow");
   ExpectErrorLine(run("edit", {"kiosk sign", "--direction", "0", "0", "1", "--no-direction"}), 2,
                   "--no-direction");
   ExpectErrorLine(run("edit", {"exhibit", "--scale", "0"}), 2, "--scale");
-  ExpectErrorLine(run("edit", {"exhibit", "--align", "0 0 0 to 1 1 1"}), 1, "at least 3 points");
+  ExpectErrorLine(run("edit", {"exhibit", "--align", "0 0 0 to 1 1 1"}), 2, "at least 3 points");
   ExpectErrorLine(run("edit", {"exhibit", "--align", "0 0 0 to pixel 1 1, 1 0 0 to 1 0 0, 0 1 0 to 1 1 0"}),
                   1, "no image");
-  ExpectErrorLine(run("edit", {"exhibit", "--bend", corners + "\n0 map stop"}), 1, "--bend");
+  ExpectErrorLine(run("edit", {"exhibit", "--bend", corners + "\n0 map stop"}), 2, "--bend");
   // What cannot be carried out as a whole changes nothing.
   ExpectErrorLine(run("edit", {"exhibit", "--move", "1", "0", "0", "--unbend"}), 1, "is not bent");
   ExpectErrorLine(run("edit", {"exhibit", "--move", "1", "0", "0", "--rename", "exhibit-2"}), 1, "already");

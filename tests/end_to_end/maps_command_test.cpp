@@ -71,7 +71,7 @@ TEST_F(TourCommands, RefuseWhatIsNoTour) {
   ExpectErrorLine(Tour({"show", "All"}), 1, "no tour named 'All'");
   EXPECT_EQ(RunDocent(Tour({"create", "All", "--stops", "Lions"})).exit_status, 0);
   ExpectErrorLine(Tour({"create", "All", "--stops", "Masks"}), 1, "already a tour named 'All'");
-  ExpectErrorLine(Tour({"edit", "All"}), 1, "Nothing to change");
+  ExpectErrorLine(Tour({"edit", "All"}), 2, "Nothing to change");
   ExpectErrorLine(Tour({"edit", "All", "--minutes", "5", "--no-minutes"}), 2, "excludes");
   ExpectErrorLine(Tour({"rename", "Some", "More"}), 1, "no tour named 'Some'");
   ExpectErrorLine({"tour", "--tour", "Some", "--library", path_, "--camera", "sim:cylinder:20", "--headless"},
@@ -122,8 +122,11 @@ TEST(MapsCommand, ExportsImportsJoinsAndRecoversMaps) {
     ExpectErrorLine({"maps", "export", "Desk", "--library", path, "--output", output}, 1, "already exists");
   }
   EXPECT_TRUE(std::filesystem::exists(folder / "colmap/points3D.txt"));
-  ExpectErrorLine({"maps", "export", "Desk", "--library", path, "--output", (folder / "a.obj").string()}, 1,
+  ExpectErrorLine({"maps", "export", "Desk", "--library", path, "--output", (folder / "a.obj").string()}, 2,
                   "unknown file type");
+  ExpectErrorLine(
+      {"maps", "export", "Desk", "--library", path, "--output", (folder / "a.png").string(), "--mesh"}, 2,
+      "a mesh is written");
   const std::string saved = (folder / "saved.docent").string();
   EXPECT_THAT(RunDocent({"maps", "recover", "--library", path, "--output", saved}).output,
               HasSubstr("2 maps recovered completely and 0 partly"));
