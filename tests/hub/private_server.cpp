@@ -17,6 +17,7 @@
 
 #include "engine/base/error.h"
 #include "maps/hub/administration.h"
+#include "tests/support/must_run.h"
 
 namespace docent::maps {
 
@@ -62,7 +63,7 @@ void PrivateServer::Start() {
   const std::string options =
       "-k " + folder_.string() + " -c listen_addresses='' -c fsync=off -c shared_buffers=32MB";
   if (Run({"pg_ctl", "-D", (folder_ / "data").string(), "-o", options, "-l", (folder_ / "log").string(), "-w",
-           "-t", "60", "start"}) != 0)
+           "-t", "180", "start"}) != 0)
     throw Error("PostgreSQL cannot be started: " + Log());
 }
 
@@ -170,6 +171,7 @@ void WithHubServer::TearDownTestSuite() {
 }
 
 void WithHubServer::SetUp() {
+  if (!server_ && MustRun()) FAIL() << "no PostgreSQL server can be started: " << problem_;
   if (!server_) GTEST_SKIP() << "no PostgreSQL server can be started: " << problem_;
   static int count = 0;
   database_ = "hub" + std::to_string(++count);

@@ -10,6 +10,7 @@
 #include "content/scene.h"
 #include "engine/base/error.h"
 #include "engine/base/random.h"
+#include "tests/support/must_run.h"
 #include "ui/context.h"
 #include "ui/renderer.h"
 
@@ -23,6 +24,7 @@ class OffscreenTest : public ::testing::Test {
     try {
       context_ = std::make_unique<OffscreenContext>();
     } catch (const Error& error) {
+      if (MustRun()) FAIL() << error.what();
       GTEST_SKIP() << error.what();
     }
   }
