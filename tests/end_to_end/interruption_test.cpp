@@ -1,0 +1,116 @@
+// SPDX-License-Identifier: Apache-2.0
+// The real program is told to end while it works, by Ctrl-C (SIGINT) or by the system (SIGTERM).
+#include <gmock/gmock.h>
+#include <signal.h>
+
+#include <chrono>
+#include <filesystem>
+#include <functional>
+#include <optional>
+#include <string>
+#include <thread>
+#include <utility>
+#include <vector>
+
+#include "maps/library/library.h"
+#include "tests/app/support/temporary_folder.h"
+#include "tests/end_to_end/run_docent.h"
+
+namespace docent::app {
+namespace {
+
+using ::testing::EndsWith;
+using ::testing::HasSubstr;
+using ::testing::IsEmpty;
+
+// Images of an hour, black after twenty seconds: no run ends by itself meanwhile.
+constexpr const char* kLongWalk = "sim:room,rest=3600,rest-at=20";
+
+class InterruptedProgram : public ::testing::TestWithParam<int> {
+ protected:
+  void TearDown() override {
+    if (child_ > 0) {
+      kill(child_, SIGKILL);
+      waitpid(child_, nullptr, 0);
+    }
+  }
+
+  void Start(const std::vector<std::string>& arguments) {
+    child_ = StartDocent(arguments, (folder_ / "out").string(), (folder_ / "err").string());
+  }
+  bool IsRunning() const {
+    siginfo_t ended{};
+    waitid(P_PID, static_cast<id_t>(child_), &ended, WEXITED | WNOHANG | WNOWAIT);
+    return ended.si_pid == 0;
+  }
+  // Waits until something is the case while the program runs, at most four minutes.
+  void WaitUntil(const std::function<bool()>& is_so) const {
+    const auto end = std::chrono::steady_clock::now() + std::chrono::minutes(4);
+    while (!is_so() && IsRunning() && std::chrono::steady_clock::now() < end)
+      std::this_thread::sleep_for(std::chrono::milliseconds(5));
+  }
+  // Whether the program has said that it handles the signal itself.
+  bool HandlesTheSignal() const {
+    const std::string status = ReadAll("/proc/" + std::to_string(child_) + "/status"), name = "SigCgt:";
+    const std::size_t at = status.find(name);
+    if (at == std::string::npos) return false;
+    return std::stoull(status.substr(at + name.size()), nullptr, 16) >> (GetParam() - 1) & 1;
+  }
+  // Sends the signal and waits for the end; empty if the program still runs.
+  std::optional<int> Interrupt() {
+    EXPECT_TRUE(IsRunning()) << Errors();
+    kill(child_, GetParam());
+    WaitUntil([] { return false; });
+    if (IsRunning()) return std::nullopt;
+    int status = -1;
+    waitpid(std::exchange(child_, -1), &status, 0);
+    return WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status);
+  }
+  std::string Errors() const { return ReadAll(folder_ / "err"); }
+
+  const TemporaryFolder folder_;
+  const std::string library_ = (folder_ / "room.docent").string(), output_ = (folder_ / "run").string();
+
+ private:
+  pid_t child_ = -1;
+};
+INSTANTIATE_TEST_SUITE_P(Interruption, InterruptedProgram, ::testing::Values(SIGINT, SIGTERM),
+                         [](const auto& signal) { return signal.param == SIGINT ? "CtrlC" : "Terminate"; });
+
+TEST_P(InterruptedProgram, SavesTheMapOfAnAuthor) {
+  const auto script = folder_.Write("script.txt", "0.1 map new Room\n");
+  Start({"author", "--library", library_, "--camera", kLongWalk, "--headless", "--pace", "lockstep",
+         "--script", script.string(), "--output", output_});
+  WaitUntil(
+      [&] { return ReadAll(folder_ / "run/events.csv.part").find("started Room") != std::string::npos; });
+  EXPECT_EQ(Interrupt(), 0) << Errors();
+  EXPECT_THAT(ReadAll(folder_ / "run/events.csv"), HasSubstr("started Room"));
+  const maps::Library library = maps::Library::Open(library_, maps::Access::kReadOnly);
+  EXPECT_THAT(library.Verify(), IsEmpty());
+  const maps::MapInfo room = library.FindByName("Room");
+  EXPECT_GE(library.Load(room.key).snapshot->keyframes.size(), 2u);
+}
+
+TEST_P(InterruptedProgram, EndsATourWell) {
+  {
+    maps::Library library =
+        maps::Library::Open(library_, maps::Access::kReadWrite, maps::CreateIfMissing::kYes);
+    library.Save({library.NewKey(), "Lions", maps::Policy::kOpen, nullptr, nullptr});
+  }
+  Start({"tour", "--library", library_, "--camera", kLongWalk, "--headless", "--output", output_});
+  WaitUntil([this] { return HandlesTheSignal(); });
+  EXPECT_EQ(Interrupt(), 0) << Errors();
+  EXPECT_TRUE(std::filesystem::exists(folder_ / "run/events.csv"));
+}
+
+TEST_P(InterruptedProgram, WritesNoCalibration) {
+  const std::string calibration = (folder_ / "camera.yaml").string();
+  Start({"calibrate", "--camera", kLongWalk, "--headless", "--output", calibration});
+  WaitUntil([this] { return HandlesTheSignal(); });
+  EXPECT_EQ(Interrupt(), 1);
+  EXPECT_THAT(Errors(), EndsWith("docent: Interrupted; nothing was written.\n"));
+  EXPECT_FALSE(std::filesystem::exists(calibration));
+}
+
+}  // namespace
+}  // namespace docent::app
