@@ -6,7 +6,9 @@
 #include <string>
 #include <vector>
 
+#include "app/simulator/simulation.h"
 #include "maps/library/library.h"
+#include "tests/app/support/simulated_map.h"
 #include "tests/app/support/temporary_folder.h"
 #include "tests/end_to_end/run_docent.h"
 
@@ -14,7 +16,9 @@ namespace docent::app {
 namespace {
 
 using ::testing::HasSubstr;
+using ::testing::IsEmpty;
 using ::testing::Not;
+using ::testing::StartsWith;
 
 // A library of three maps without keyframes.
 class TourCommands : public ::testing::Test {
@@ -131,6 +135,31 @@ TEST(MapsCommand, ExportsImportsJoinsAndRecoversMaps) {
   EXPECT_THAT(RunDocent({"maps", "recover", "--library", path, "--output", saved}).output,
               HasSubstr("2 maps recovered completely and 0 partly"));
   ExpectErrorLine({"maps", "recover", "--library", path, "--output", saved}, 1, "exists already");
+}
+
+TEST(MapsCommand, DensifiesAMapOnce) {
+  const TemporaryFolder folder;
+  const std::string path = (folder / "room.docent").string();
+  SimulationOptions options;
+  options.duration_s = 4;
+  const auto simulation = MakeSimulation("room", options);
+  {
+    maps::Library library = maps::Library::Open(path, maps::Access::kReadWrite, maps::CreateIfMissing::kYes);
+    library.Save({library.NewKey(), "Table", maps::Policy::kOpen,
+                  SimulatedMap(*simulation, EvenlySpacedFrames(*simulation, 6)), nullptr});
+  }
+  const Outcome first = RunDocent({"maps", "densify", "--library", path});
+  EXPECT_EQ(first.exit_status, 0) << first.errors;
+  EXPECT_THAT(first.output, StartsWith("Table has a mesh now: "));
+  {
+    const maps::Library library = maps::Library::Open(path, maps::Access::kReadOnly);
+    EXPECT_THAT(library.Verify(), IsEmpty());
+    const auto mesh = library.LoadMesh(library.FindByName("Table").key);
+    ASSERT_TRUE(mesh);
+    EXPECT_GT(mesh->mesh.triangles.size(), 0u);
+    EXPECT_EQ(mesh->keyframes.size(), 6u);
+  }
+  EXPECT_EQ(RunDocent({"maps", "densify", "--library", path}).output, "Table has a mesh already\n");
 }
 
 }  // namespace
