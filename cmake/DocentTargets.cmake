@@ -99,15 +99,19 @@ function(docent_add_library name)
   docent_unity(${name})
 endfunction()
 
-# docent_add_tests(NAME LIBS libs... [DEPENDS targets...] [SUITES suites...] [UNITY]): every *_test.cpp below the
-# folder, discovered by ctest, each test a process of its own. A suite that is named here is one process, and one entry
-# for ctest: its tests look at the same run, which takes longer to make than to look at. With UNITY, the sources may be
+# docent_add_tests(NAME LIBS libs... [DEPENDS targets...] [SUITES suites...] [TIMEOUT seconds] [UNITY]): every
+# *_test.cpp below the folder, discovered by ctest, each test a process of its own. A suite that is named here is one
+# process, and one entry for ctest: its tests look at the same run, which takes longer to make than to look at. A
+# process that takes longer than the timeout, ten minutes if none is given, has failed. With UNITY, the sources may be
 # compiled several at once, so that names in their anonymous namespaces must differ.
 function(docent_add_tests name)
-  cmake_parse_arguments(ARG "UNITY" "" "LIBS;DEPENDS;SUITES" ${ARGN})
+  cmake_parse_arguments(ARG "UNITY" "TIMEOUT" "LIBS;DEPENDS;SUITES" ${ARGN})
   file(GLOB_RECURSE sources CONFIGURE_DEPENDS "${CMAKE_CURRENT_SOURCE_DIR}/*.cpp")
   if(NOT sources)
     return()
+  endif()
+  if(NOT ARG_TIMEOUT)
+    set(ARG_TIMEOUT 600)
   endif()
   add_executable(${name} ${sources})
   target_link_libraries(${name} PRIVATE ${ARG_LIBS} GTest::gtest GTest::gmock GTest::gtest_main)
@@ -123,9 +127,9 @@ function(docent_add_tests name)
   foreach(suite IN LISTS ARG_SUITES)
     add_test(NAME ${suite} COMMAND ${name} --gtest_filter=${suite}.*)
     # A suite that was renamed would pass by running nothing.
-    set_tests_properties(${suite} PROPERTIES TIMEOUT 600 FAIL_REGULAR_EXPRESSION "Running 0 tests")
+    set_tests_properties(${suite} PROPERTIES TIMEOUT ${ARG_TIMEOUT} FAIL_REGULAR_EXPRESSION "Running 0 tests")
   endforeach()
   list(TRANSFORM ARG_SUITES APPEND ".*")
   list(JOIN ARG_SUITES ":" whole)
-  gtest_discover_tests(${name} TEST_FILTER "-${whole}" PROPERTIES TIMEOUT 600 DISCOVERY_TIMEOUT 60)
+  gtest_discover_tests(${name} TEST_FILTER "-${whole}" PROPERTIES TIMEOUT ${ARG_TIMEOUT} DISCOVERY_TIMEOUT 60)
 endfunction()
