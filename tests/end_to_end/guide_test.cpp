@@ -27,6 +27,7 @@ namespace {
 using ::testing::AllOf;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
+using ::testing::StartsWith;
 
 // A museum of two bays: its simulation, the script that authors it, and the time at which the visits begin.
 struct Museum {
@@ -193,9 +194,10 @@ TEST(Guide, AuthorsMapsThatATourRecognizesAndLeavesUnchanged) {
   LeadFromBayToBay(path);
   folder.Write("visit.txt", std::string("6 tour back\n6.5 tour restart\n"));
   const std::string before = ReadAll(path);
-  const Outcome toured = RunDocent({"tour", "--library", path, "--camera", museum.camera, "--from",
-                                    museum.visits_from, "--headless", "--tour", "Bays", "--script",
-                                    (folder / "visit.txt").string(), "--output", (folder / "tour").string()});
+  const Outcome toured =
+      RunDocent({"tour", "--library", path, "--camera", museum.camera, "--from", museum.visits_from,
+                 "--headless", "--tour", "Bays", "--script", (folder / "visit.txt").string(), "--output",
+                 (folder / "tour").string(), "--log", (folder / "visits").string()});
   ASSERT_EQ(toured.exit_status, 0) << toured.errors;
   EXPECT_EQ(before, ReadAll(folder / "l.docent"));
 
@@ -219,6 +221,28 @@ TEST(Guide, AuthorsMapsThatATourRecognizesAndLeavesUnchanged) {
                     HasSubstr(",tour,finished; 2 of 2 stops seen"), HasSubstr(",command,tour back"),
                     HasSubstr(",tour,\"going back to 'Bay 1', stop 1 of 2\""),
                     HasSubstr(",command,tour restart"), HasSubstr(",tour,the visitor begins anew")));
+
+  const std::string page = (folder / "visits.html").string();
+  const Outcome reported = RunDocent({"report", (folder / "visits").string(), "--output", page});
+  EXPECT_EQ(reported.exit_status, 0) << reported.errors;
+  EXPECT_THAT(reported.output, HasSubstr("the report is in " + page));
+  EXPECT_THAT(ReadAll(page), AllOf(HasSubstr("<td>Bay 0</td>"), HasSubstr("<td>Bay 1</td>")));
+}
+
+TEST(Guide, TheDemonstrationMakesMapsAndLeadsThroughThem) {
+  const TemporaryFolder folder;
+  const Outcome demo = RunDocent({"demo", "--headless", "--output", (folder / "demo").string()});
+  ASSERT_EQ(demo.exit_status, 0) << demo.errors;
+  EXPECT_THAT(demo.output, AllOf(HasSubstr("3 maps were built and content was placed in them.\n"),
+                                 HasSubstr(" images, a wrong one in 0 %.\n"),
+                                 HasSubstr("Typical placement error: "), HasSubstr("Results: ")));
+  const maps::Library library = maps::Library::Open(folder / "demo/museum.docent", maps::Access::kReadOnly);
+  EXPECT_THAT(library.Verify(), IsEmpty());
+  EXPECT_EQ(library.List().size(), 3u);
+  for (const char* name : {"tour-Bay-0.png", "tour-Bay-1.png", "tour-Bay-2.png", "map-Bay-0.png"})
+    EXPECT_THAT(ReadAll(folder / "demo" / name), StartsWith("\x89PNG\r\n")) << name;
+  EXPECT_GT(std::filesystem::file_size(folder / "demo/tour.mp4"), 10000u);
+  EXPECT_THAT(ReadAll(folder / "demo/report.html"), HasSubstr("tour"));
 }
 
 TEST(Guide, AuthorsAndToursWithTwoCamerasInOneMap) {
