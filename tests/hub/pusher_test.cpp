@@ -19,6 +19,9 @@ using namespace std::chrono_literals;
 using Clock = std::chrono::steady_clock;
 using testing::HasSubstr;
 
+// What takes a moment takes longer on a machine that is loaded tenfold.
+constexpr auto kLongest = 60s;
+
 class HubPush : public WithHubServer {
  protected:
   // What was told so far.
@@ -32,8 +35,8 @@ class HubPush : public WithHubServer {
       sentences_.push_back(sentence);
     };
   }
-  bool WaitUntilTold(const std::string& part, std::chrono::seconds longest) {
-    const auto end = Clock::now() + longest;
+  bool WaitUntilTold(const std::string& part) {
+    const auto end = Clock::now() + kLongest;
     while (Told().find(part) == std::string::npos) {
       if (Clock::now() > end) return false;
       std::this_thread::sleep_for(5ms);
@@ -66,10 +69,10 @@ TEST_F(HubPush, WhatASessionSavesIsSoonOnTheHub) {
   }
   const SessionLock session(folder_ / "a", SessionLockKind::kSession);
   HubPusher pusher(SampleSync(Url(), folder_ / "a"), Tell());
-  EXPECT_TRUE(WaitUntilTold("was added to the hub", 10s)) << Told();
+  EXPECT_TRUE(WaitUntilTold("was added to the hub")) << Told();
   ChangeText("first");
   pusher.LibraryWasSaved();
-  EXPECT_TRUE(WaitUntilTold("as revision 2", 2s)) << Told();
+  EXPECT_TRUE(WaitUntilTold("as revision 2")) << Told();
   EXPECT_EQ(TextElsewhere(), "first");
   ChangeText("last");
   pusher.LibraryWasSaved();
@@ -83,13 +86,13 @@ TEST_F(HubPush, AHubThatIsGoneGetsTheChangesWhenItIsBack) {
     AddSampleMap(&a, "Desk", 7);
   }
   HubPusher pusher(SampleSync(Url(), folder_ / "a"), Tell());
-  ASSERT_TRUE(WaitUntilTold("was added to the hub", 10s)) << Told();
+  ASSERT_TRUE(WaitUntilTold("was added to the hub")) << Told();
   server().Stop();
   ChangeText("during the cut");
   pusher.LibraryWasSaved();
-  EXPECT_TRUE(WaitUntilTold("sent to the hub later", 10s)) << Told();
+  EXPECT_TRUE(WaitUntilTold("sent to the hub later")) << Told();
   server().Start();
-  EXPECT_TRUE(WaitUntilTold("as revision 2", 20s)) << Told();
+  EXPECT_TRUE(WaitUntilTold("as revision 2")) << Told();
   EXPECT_EQ(TextElsewhere(), "during the cut");
   EXPECT_TRUE(pusher.Finish());
 }
@@ -136,7 +139,7 @@ TEST_F(HubPush, AnEndWithoutAHubSaysThatSomethingIsMissing) {
   pusher.LibraryWasSaved();
   EXPECT_FALSE(pusher.Finish());
   EXPECT_THAT(Told(), HasSubstr("changes are saved in the library"));
-  EXPECT_LT(Clock::now() - start, 5s);
+  EXPECT_LT(Clock::now() - start, kLongest);
 }
 
 TEST_F(HubPush, AMapThatWasChangedOnBothSidesWaitsForTheEndOfTheSession) {
