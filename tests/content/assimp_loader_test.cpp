@@ -10,25 +10,18 @@
 #include "content/asset.h"
 #include "content/gltf/resources.h"
 #include "engine/base/error.h"
+#include "tests/app/support/temporary_folder.h"
 
 namespace docent::content {
 namespace {
 
 class OtherFormats : public ::testing::Test {
  protected:
-  void SetUp() override {
-    folder_ =
-        std::filesystem::temp_directory_path() /
-        ("docent_formats_" + std::string(::testing::UnitTest::GetInstance()->current_test_info()->name()) +
-         "_" + std::to_string(::testing::UnitTest::GetInstance()->random_seed()));
-    std::filesystem::create_directories(folder_);
-  }
-  void TearDown() override { std::filesystem::remove_all(folder_); }
   std::filesystem::path Write(const std::string& name, const std::string& bytes) {
     std::ofstream(folder_ / name, std::ios::binary) << bytes;
     return folder_ / name;
   }
-  std::filesystem::path folder_;
+  const app::TemporaryFolder folder_;
 };
 
 constexpr const char* kSquare =
@@ -65,7 +58,7 @@ TEST_F(OtherFormats, AnObjBecomesTrianglesWithItsMaterialAndTexture) {
     EXPECT_FLOAT_EQ(vertex.uv0.y, 1 - vertex.position.y / 3);
   }
   // The asset is self-contained.
-  std::filesystem::remove_all(folder_);
+  std::filesystem::remove_all(folder_.path());
   EXPECT_EQ(AssetFromBytes(asset.name, asset.bytes).model->images.size(), 1u);
 }
 

@@ -12,6 +12,7 @@
 #include "content/asset.h"
 #include "content/flat_image.h"
 #include "content/sound.h"
+#include "tests/app/support/temporary_folder.h"
 #include "tests/content/media_samples.h"
 #include "tests/support/error_of.h"
 
@@ -166,8 +167,7 @@ TEST(SoundAssets, WhatIsNoWholeSoundIsRefused) {
 }
 
 TEST(SoundAssets, AFileIsReadOnlyAsWhatItIsToBe) {
-  const auto folder = std::filesystem::temp_directory_path() / "docent-media-assets-test";
-  std::filesystem::create_directories(folder);
+  const app::TemporaryFolder folder;
   WriteBytes(folder / "bell.flac", SoundBytesOf(SF_FORMAT_FLAC | SF_FORMAT_PCM_16, 1, 8000, 800));
   WriteBytes(folder / "plan.png", PngBytes(3, 3));
   EXPECT_EQ(ImportSound(folder / "bell.flac").name, "bell.flac");
@@ -175,7 +175,6 @@ TEST(SoundAssets, AFileIsReadOnlyAsWhatItIsToBe) {
   EXPECT_THROW(ImportSound(folder / "plan.png"), Error);
   EXPECT_THROW(ImportImage(folder / "bell.flac"), Error);
   EXPECT_THROW(ImportImage(folder / "missing.png"), Error);
-  std::filesystem::remove_all(folder);
 }
 
 }  // namespace

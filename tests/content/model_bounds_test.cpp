@@ -3,10 +3,9 @@
 
 #include <gtest/gtest.h>
 
-#include <chrono>
-
 #include "content/picking.h"
 #include "content/warp.h"
+#include "tests/support/processor_time.h"
 
 namespace docent::content {
 namespace {
@@ -42,29 +41,30 @@ Model SkinnedByAllNodes(int count) {
 
 class ManySkinnedNodes : public ::testing::Test {
  protected:
-  // A matrix for each joint of each node takes minutes, one for each joint a moment.
-  static constexpr auto kMoment = std::chrono::seconds(15);
+  // A matrix for each joint of each node takes minutes, one for each joint a moment. What other programs do
+  // meanwhile does not count.
+  static constexpr double kMoment_s = 15;
 
-  ~ManySkinnedNodes() override { EXPECT_LT(std::chrono::steady_clock::now() - begin_, kMoment); }
+  ~ManySkinnedNodes() override { EXPECT_LT(ProcessorTime_s() - begin_s_, kMoment_s); }
 
   const Model model_ = SkinnedByAllNodes(100'000);
-  const std::chrono::steady_clock::time_point begin_ = std::chrono::steady_clock::now();
+  const double begin_s_ = ProcessorTime_s();
 };
 
-TEST_F(ManySkinnedNodes, HaveTheirBoundsInAMoment) {
+TEST_F(ManySkinnedNodes, HaveBoundsAfterFewSecondsOfProcessorTime) {
   const auto bounds = RestBounds(model_);
   ASSERT_TRUE(bounds);
   EXPECT_EQ(bounds->first, glm::vec3(1, 0, 0));
   EXPECT_EQ(bounds->second, glm::vec3(3, 2, 0));
 }
 
-TEST_F(ManySkinnedNodes, AreMetByARayInAMoment) {
+TEST_F(ManySkinnedNodes, AreMetByARayAfterFewSecondsOfProcessorTime) {
   const auto distance = IntersectModel({{1.5, 0.5, -5}, {0, 0, 1}}, model_, engine::Sim3(), -1, 0);
   ASSERT_TRUE(distance);
   EXPECT_NEAR(*distance, 5, 1e-9);
 }
 
-TEST_F(ManySkinnedNodes, AreBentInAMoment) {
+TEST_F(ManySkinnedNodes, AreBentAfterFewSecondsOfProcessorTime) {
   const auto warped = Warped(model_, Warp());
   EXPECT_EQ(warped->bounds_min, glm::vec3(1, 0, 0));
   EXPECT_EQ(warped->bounds_max, glm::vec3(3, 2, 0));

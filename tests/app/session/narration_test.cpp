@@ -210,7 +210,7 @@ TEST_F(SpeechProgram, DoesNotKeepATourFromEndingWhenItHangs) {
   EXPECT_LT(std::chrono::steady_clock::now() - begin, std::chrono::seconds(60));
 }
 
-TEST_F(SpeechProgram, IsNotNeeded) {
+TEST_F(SpeechProgram, AMissingProgramIsReported) {
   setenv("PATH", (folder_ / "").c_str(), 1);
   Speech speech("en");
   speech.Say("Lions");
