@@ -65,7 +65,7 @@ TEST(LabelLayout, ABoardThatHasToMoveComesInsideFromTheEdge) {
   EXPECT_TRUE(LayOutApart(alone, kCanvas, 4)[0].isApprox(alone[0])) << "it covers nothing";
 }
 
-TEST(LabelLayout, WhatHasNoRoomStays) {
+TEST(LabelLayout, BoardsWithoutRoomAreNotMoved) {
   const std::vector<Box> boards(3, BoardAt(0, 0, 1000, 800));
   for (const Box& board : LayOutApart(boards, kCanvas, 2)) EXPECT_TRUE(board.isApprox(boards[0]));
 }

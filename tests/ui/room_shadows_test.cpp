@@ -224,7 +224,7 @@ TEST_F(RoomShadowsTest, AreDrawnAgainOnlyForWhatMoves) {
   EXPECT_EQ(triangles_, with_both - 2 * kCubeTriangles);
 }
 
-TEST_F(RoomShadowsTest, FollowWhatChanges) {
+TEST_F(RoomShadowsTest, EqualNewlyDrawnOnesAfterAnyChange) {
   const auto is_as_if_new = [this](const char* what) {
     const cv::Mat kept = Draw(Floor(1));
     StartAnew();

@@ -173,7 +173,7 @@ TEST_F(InterfaceOnScreen, ThePanelOpensAndCloses) {
   EXPECT_TRUE(panel_->choices().panel_open);
 }
 
-TEST_F(InterfaceOnScreen, TheListSelects) {
+TEST_F(InterfaceOnScreen, AClickInTheListSelectsTheEntity) {
   content::Scene scene;
   scene.entities.resize(2);
   scene.entities[0].name = "sign-1";

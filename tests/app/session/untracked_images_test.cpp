@@ -141,7 +141,7 @@ TEST(UntrackedImages, NoticesTheEndOfTheSource) {
   EXPECT_TRUE(tracking.images.has_ended());
 }
 
-TEST(UntrackedImages, PassesOnWhatTheWorkThrows) {
+TEST(UntrackedImages, RethrowsTheExceptionOfTheWork) {
   SlowTracking tracking(100);
   const auto fails = [] { throw std::runtime_error("no"); };
   EXPECT_THROW(tracking.images.During(fails, std::chrono::nanoseconds(0), Timestamp{}, Timestamp{}),

@@ -78,8 +78,7 @@ TEST(PositionFilter, TakesAnEstimateThatContainsThePredictionAsItIs) {
   EXPECT_LT((filter.Predict(ImageTime(60), kDepth)->center - center).norm(), 1e-12);
 }
 
-// The sigma that it states is that of its errors.
-TEST(PositionFilter, KnowsItsErrors) {
+TEST(PositionFilter, SigmaMatchesTheErrors) {
   Random random(7);
   double squared = 0, expected = 0;
   constexpr double kSigma = 0.02;  // metres
