@@ -87,7 +87,13 @@ class GuideWindow {
   }
 
   void Close() {
-    if (recorder_) recorder_->Close();
+    try {
+      if (recorder_) recorder_->Close();
+    } catch (const Error& error) {
+      // With a failure, a kiosk that its staff has ended would start again.
+      if (request_.kiosk_code.empty()) throw;
+      spdlog::error("{}", error.what());
+    }
     spdlog::debug("{}", times_.Summary());
   }
 
