@@ -61,7 +61,8 @@ void GuideFiles::WriteScript(const Action& action) {
 }
 
 void GuideFiles::HandleFailure(const std::string& problem) {
-  problem_ = problem;
+  if (!problem_.empty()) problem_ += ' ';
+  problem_ += problem;
   if (!failures_.empty()) failures_ += ' ';
   failures_ += problem;
 }
