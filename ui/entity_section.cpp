@@ -221,7 +221,8 @@ void EntitySection::Fill(const content::Entity& entity, const AuthoringFacts& fa
     language_.clear();
   }
   name_ = entity.name;
-  text_ = TextIn(entity, content::LanguageTag(language_));
+  if (other || text_.size() <= content::kMaxTextBytes)
+    text_ = TextIn(entity, content::LanguageTag(language_));
   for (int i = 0; i < 3; ++i) offset_[i] = entity.label.offset[i];
   for (int i = 0; i < 3; ++i) sides_[i] = entity.occluder.size[i];
   const Eigen::Vector3d direction = entity.signpost.direction.value_or(Eigen::Vector3d::Zero());
@@ -264,21 +265,27 @@ void EntitySection::DrawName(const content::Entity& entity, const AuthoringFacts
 
 // The text and, below it, the language whose variant it is.
 void EntitySection::DrawText(const content::Entity& entity) {
+  const std::string tag = content::LanguageTag(language_);
+  const bool is_valid = language_.empty() || !tag.empty();
   const bool can_hold = FieldCanHold(text_);
+  // What is written for no language would be lost.
+  ImGui::BeginDisabled(!is_valid);
   ImGui::InputTextMultiline("##text", &text_, ImVec2(-1.0f, 3.5f * ImGui::GetTextLineHeight()),
                             can_hold ? 0 : ImGuiInputTextFlags_ReadOnly);
   is_writing_ = ImGui::IsItemActive() || is_writing_;
-  const std::string tag = content::LanguageTag(language_);
-  const bool is_valid = language_.empty() || !tag.empty();
+  const bool completed = ImGui::IsItemDeactivatedAfterEdit();
+  ImGui::EndDisabled();
+  const bool is_too_long = text_.size() > content::kMaxTextBytes;
   const std::string shown = TextIn(entity, tag);
   // An empty text removes the variant of a language.
-  if (ImGui::IsItemDeactivatedAfterEdit() && is_valid && text_ != shown && (!text_.empty() || !tag.empty()))
+  if (completed && is_valid && !is_too_long && text_ != shown && (!text_.empty() || !tag.empty()))
     actions_->SetText(entity.name, text_, tag);
   ImGui::SetNextItemWidth(-1.0f);
   if (ImGui::InputTextWithHint("##language", strings::kLanguageHint, &language_))
     text_ = TextIn(entity, content::LanguageTag(language_));
   if (!is_valid) Remark(strings::kNoLanguage);
   if (!can_hold) Remark(strings::kNotWritableHere);
+  if (is_too_long) Remark(strings::kTextTooLong);
   const std::string missing = Joined(content::MissingLanguages(entity, languages_));
   if (!missing.empty()) Remark((strings::kTextWithoutLanguages + missing + ".").c_str());
 }

@@ -37,7 +37,8 @@ class EntitySection {
   void DrawOccluder(const content::Entity& entity);
   void DrawPose(const content::Entity& entity, const AuthoringFacts& facts);
   void DrawButtons(const content::Entity& first, const AuthoringFacts& facts);
-  // Copies what the fields show from the entity, unless it is being written.
+  // Copies what the fields show from the entity, unless it is being written. A text that was too long to
+  // become a change stays, so that it can be shortened.
   void Fill(const content::Entity& entity, const AuthoringFacts& facts);
 
   AuthoringActions* const actions_;

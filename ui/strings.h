@@ -195,6 +195,8 @@ inline constexpr const char* kLeaveHereHelp = "The arrow points where the camera
 inline constexpr const char* kRemoveArrow = "Remove arrow";
 inline constexpr const char* kLanguageHint = "Language of the text: de, es, …";
 inline constexpr const char* kNoLanguage = "This is not a language tag such as de or es-419.";
+inline constexpr const char* kTextTooLong =
+    "This text is too long and is not kept: shorten it to 10,000 bytes.";
 inline constexpr const char* kNotWritableHere =
     "It has characters, such as emoji, that a field cannot hold. Change it with docent content edit.";
 inline constexpr const char* kMapNotWritableHere =

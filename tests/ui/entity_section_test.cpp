@@ -35,6 +35,12 @@ class FieldsOfEntities : public PanelWithoutScreen {
   static float FirstLine() { return ImGui::GetStyle().WindowPadding.y + 0.5f * ImGui::GetFrameHeight(); }
   void ClickName() { Click(kWidth - 40, FirstLine()); }
   void ClickText() { Click(kWidth - 40, FirstLine() + ImGui::GetFrameHeightWithSpacing()); }
+  void ClickLanguage() {
+    const ImGuiStyle& style = ImGui::GetStyle();
+    const float text = FirstLine() + ImGui::GetFrameHeightWithSpacing() - 0.5f * ImGui::GetFrameHeight();
+    Click(kWidth - 40,
+          text + 3.5f * ImGui::GetTextLineHeight() + style.ItemSpacing.y + 0.5f * ImGui::GetFrameHeight());
+  }
   // A click in the image, which changes the selection before the panel is drawn.
   void ClickImageAndSelect(std::vector<std::string> names) {
     MoveToImage();
@@ -119,6 +125,36 @@ TEST_F(FieldsOfEntities, CharactersThatAFieldCannotHoldStayWhenItIsLeft) {
   ClickName();
   ClickImage();
   EXPECT_THAT(asked_.words, IsEmpty());
+}
+
+TEST_F(FieldsOfEntities, NoTextIsWrittenForAWrongLanguage) {
+  ClickLanguage();
+  ASSERT_TRUE(WritesText());
+  Type("d");
+  ClickText();
+  EXPECT_FALSE(WritesText());
+  ClickLanguage();
+  Type("e");
+  ClickText();
+  ASSERT_TRUE(WritesText());
+  Type("Elefanten");
+  ClickImage();
+  EXPECT_THAT(asked_.words, ElementsAre("text sign-1 Elefanten in de"));
+}
+
+TEST_F(FieldsOfEntities, ATextThatIsTooLongStaysUntilItIsShortened) {
+  scene_.entities[0].signpost.text = std::string(content::kMaxTextBytes, 'a');
+  Draw();
+  ClickText();
+  Type("b");
+  ClickImage();
+  EXPECT_THAT(asked_.words, IsEmpty());
+  Draw();
+  ClickText();
+  PressBackspace();
+  ClickImage();
+  ASSERT_EQ(asked_.words.size(), 1u);
+  EXPECT_NE(asked_.words[0].find('b'), std::string::npos);
 }
 
 TEST_F(FieldsOfEntities, AfterThePanelWasClosedTheNameIsThatOfTheEntityThatIsSelectedThen) {
