@@ -15,8 +15,10 @@ void RunSounds::Ask(std::span<const SoundDirector::Key> sounds) {
 std::vector<Event> RunSounds::Add(ShownFrame* frame) {
   static const content::Scene kNoScene;
   const engine::TrackedFrame& tracked = frame->tracked;
+  // A visitor's pose that is not believed (see VisitorGuide) has no content, or that of the last pose before.
+  const bool is_believed = frame->shown.scene && !frame->held_camera_from_map;
   std::optional<Eigen::Vector3d> place;
-  if (engine::HasPose(tracked.state)) place = tracked.camera_from_map.OriginInSource();
+  if (engine::HasPose(tracked.state) && is_believed) place = tracked.camera_from_map.OriginInSource();
   SoundDirector::Orders orders = director_.Update(frame->seconds, tracked.map_key,
                                                   frame->shown.scene ? *frame->shown.scene : kNoScene, place);
   frame->caption = orders.caption;
