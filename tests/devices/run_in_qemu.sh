@@ -58,7 +58,7 @@ chmod +x "$root/init"
 (cd "$root" && find . | cpio --create --format=newc --quiet) >"$work/disk.cpio"
 
 # Full emulation behaves the same with and without hardware support.
-timeout 300 qemu-system-x86_64 -accel tcg -cpu max -smp 2 -m 3072 -nographic -no-reboot -nodefaults -serial stdio \
+timeout 540 qemu-system-x86_64 -accel tcg -cpu max -smp 2 -m 3072 -nographic -no-reboot -nodefaults -serial stdio \
   -kernel "$folder/vmlinuz" -initrd "$work/disk.cpio" \
   -append "console=ttyS0 quiet panic=-1 mitigations=off nokaslr random.trust_cpu=on tsc=unstable" \
   </dev/null >"$work/console.log" 2>&1 || true

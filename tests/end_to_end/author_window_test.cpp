@@ -5,6 +5,7 @@
 #include <chrono>
 #include <cstdlib>
 #include <fstream>
+#include <functional>
 #include <iterator>
 #include <optional>
 #include <sstream>
@@ -16,6 +17,7 @@
 #include "app/files/text_file.h"
 #include "maps/library/library.h"
 #include "tests/end_to_end/run_docent.h"
+#include "tests/end_to_end/screen_reader.h"
 #include "tests/support/virtual_screen.h"
 
 namespace docent::app {
@@ -35,6 +37,8 @@ constexpr const char* kAuthorsCamera = "sim:room";
 // An author at a window of 1280 x 800: the image lies in the left 960 units, 960 x 720.
 class AuthorAtWindow : public ::testing::Test {
  protected:
+  static constexpr int kWidth = 1280, kHeight = 800;
+
   void SetUp() override {
     if (!screen_.works()) GTEST_SKIP() << "Xvfb is not installed";
     if (!HasXdotool()) GTEST_SKIP() << "xdotool is not installed";
@@ -70,9 +74,15 @@ class AuthorAtWindow : public ::testing::Test {
       const std::string events{std::istreambuf_iterator<char>(file), {}};
       return events.find("started Room") != std::string::npos;
     };
-    for (int i = 0; i < 1200 && !has_started(); ++i)
+    EXPECT_TRUE(Wait(has_started));
+  }
+  // At most two minutes.
+  static bool Wait(const std::function<bool()>& is_so) {
+    for (int i = 0; i < 1200; ++i) {
+      if (is_so()) return true;
       std::this_thread::sleep_for(std::chrono::milliseconds(100));
-    EXPECT_TRUE(has_started());
+    }
+    return false;
   }
   std::string library() { return (folder_ / "room.docent").string(); }
   static void Do(const std::string& xdotool) {
@@ -92,22 +102,31 @@ class AuthorAtWindow : public ::testing::Test {
        " sleep 0.3 mousedown 1 sleep 0.2 mouseup 1 "
        "sleep 0.3");
   }
+  bool AsksWhetherToSave() const {
+    return reader_.Find("Save and quit", {0, 0, kWidth, kHeight}).has_value();
+  }
+  // Asks to quit, and waits for the question that follows.
+  void AskToQuit() {
+    Press("ctrl+q");
+    EXPECT_TRUE(Wait([this] { return AsksWhetherToSave() || !IsRunning(); }));
+    EXPECT_TRUE(IsRunning()) << "it asks first";
+  }
   bool IsRunning() {
     siginfo_t ended{};
     waitid(P_PID, static_cast<id_t>(child_), &ended, WEXITED | WNOHANG | WNOWAIT);
     return ended.si_pid == 0;
   }
-  // Waits for the end, at most a minute.
+  // Waits for the end.
   std::optional<int> ExitStatus() {
-    for (int i = 0; i < 600 && IsRunning(); ++i) std::this_thread::sleep_for(std::chrono::milliseconds(100));
-    if (IsRunning()) return std::nullopt;
+    if (!Wait([this] { return !IsRunning(); })) return std::nullopt;
     int status = 0;
     waitpid(std::exchange(child_, -1), &status, 0);
     return WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status);
   }
 
   const TemporaryFolder folder_;
-  VirtualScreen screen_{"1280x800"};
+  VirtualScreen screen_{std::to_string(kWidth) + "x" + std::to_string(kHeight), folder_.path().string()};
+  const ScreenReader reader_{folder_.path()};
   pid_t child_ = -1;
 };
 
@@ -124,11 +143,11 @@ TEST_F(AuthorAtWindow, PlacesSelectsAndRemovesWithUndoAndSavesAtTheEnd) {
   Press("Escape");
   Press("q");
   EXPECT_TRUE(IsRunning()) << "neither Escape nor q quits";
-  Press("ctrl+q");
-  EXPECT_TRUE(IsRunning()) << "it asks first";
+  AskToQuit();
   Press("Escape");
+  EXPECT_TRUE(Wait([this] { return !AsksWhetherToSave(); }));
   EXPECT_TRUE(IsRunning());
-  Press("ctrl+q");
+  AskToQuit();
   PressLast("Return");
   EXPECT_EQ(ExitStatus(), 0) << ReadAll(folder_ / "err");
   const std::string recorded = ReadAll(folder_ / "recorded.txt");
@@ -151,7 +170,7 @@ TEST_F(AuthorAtWindow, PlacesWithTheKeyboardAlone) {
   for (int i = 0; i < 5; ++i) Press("shift+Left");
   for (int i = 0; i < 4; ++i) Press("ctrl+Up");
   Press("Return");
-  Press("ctrl+q");
+  AskToQuit();
   PressLast("Return");
   EXPECT_EQ(ExitStatus(), 0) << ReadAll(folder_ / "err");
   const std::string recorded = ReadAll(folder_ / "recorded.txt");
@@ -171,7 +190,7 @@ TEST_F(AuthorAtWindow, PlacesWithTheKeyboardAlone) {
 TEST_F(AuthorAtWindow, CanQuitWithoutSaving) {
   Start("0.1 map new Room\n", "0");
   WaitForMap();
-  Press("ctrl+q");
+  AskToQuit();
   Press("Right");  // To the second answer.
   PressLast("Return");
   EXPECT_EQ(ExitStatus(), 0) << ReadAll(folder_ / "err");

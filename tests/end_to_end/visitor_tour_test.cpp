@@ -139,12 +139,12 @@ class VisitorOfFiveStops : public ::testing::Test {
       return Count(kind, part) > before;
     });
   }
-  // Presses a key once, and waits until this is spoken. A slow program is given its time: what was pressed
-  // twice would be done twice.
-  void KeyUntilSpoken(const std::string& key, const std::string& part) {
-    const int before = Count("narration", part);
+  // Presses a key once, and waits until an event of this kind has followed. A slow program is given its time:
+  // what was pressed twice would be done twice.
+  void KeyOnce(const std::string& key, const std::string& kind, const std::string& part) {
+    const int before = Count(kind, part);
     Key(key);
-    WaitFor("narration", part, before + 1);
+    WaitFor(kind, part, before + 1);
   }
 
   // The row of the screen where the chosen line of the menu begins: a line of its border's colour that is as
@@ -248,17 +248,17 @@ TEST_F(VisitorOfFiveStops, CompletesTheTourWithTheKeyboardAlone) {
   KeyUntil("Return", "card", "'sign-1' opened");
   KeyUntil("Escape", "command", "tour close");
   WaitFor("tour", "arrived at 'Bay 0'");
-  KeyUntil("b", "tour", "going back to 'Bay 3'");
+  KeyOnce("b", "tour", "going back to 'Bay 3'");
   Key("l");
-  KeyUntil("b", "tour", "going back to 'Bay 5'");
+  KeyOnce("b", "tour", "going back to 'Bay 5'");
   Key("l");
   // The menu does the same.
   Key("m");
   Wait("the menu", [this] { return ChosenRow() >= 0; });
   Key("Down");
-  KeyUntil("Return", "tour", "going back to 'Bay 4'");
+  KeyOnce("Return", "tour", "going back to 'Bay 4'");
   RestUntil("tour", "arrived at 'Bay 4'", 2);
-  KeyUntil("n", "tour", "skipped 'Bay 2'");
+  KeyOnce("n", "tour", "skipped 'Bay 2'");
   End();
   ExpectACompleteVisit();
 }
@@ -270,11 +270,11 @@ TEST_F(VisitorOfFiveStops, CompletesTheTourByWhatIsSpoken) {
   KeyUntil("Return", "card", "'sign-1' opened");
   KeyUntil("Escape", "command", "tour close");
   WaitFor("narration", "Stop 4 of 5. Next: Bay 2");
-  KeyUntilSpoken("b", "Back to Bay 3, 3 of 5");
-  KeyUntilSpoken("b", "Back to Bay 5, 2 of 5");
-  KeyUntilSpoken("b", "Back to Bay 4, 1 of 5");
+  KeyOnce("b", "narration", "Back to Bay 3, 3 of 5");
+  KeyOnce("b", "narration", "Back to Bay 5, 2 of 5");
+  KeyOnce("b", "narration", "Back to Bay 4, 1 of 5");
   RestUntil("narration", "Stop 1 of 5. Next: Bay 2");
-  KeyUntilSpoken("n", "The tour ends here. You saw 4 of 5 stops.");
+  KeyOnce("n", "narration", "The tour ends here. You saw 4 of 5 stops.");
   End();
   ExpectACompleteVisit();
   const std::vector<std::string> spoken = Told("narration");
