@@ -382,8 +382,8 @@ TEST(NamedOptions, SayTheirDefaultsInTheHelp) {
                                     {"noise", defaults.noise_sigma},
                                     {"exposure", 1000 * defaults.exposure_s}}) {
     for (const NamedOption& option : NamedOptions()) {
-      if (option.name == name)
-        EXPECT_THAT(option.meaning, HasSubstr("(default " + FormatNumber(value, 3) + ")")) << name;
+      if (option.name != name) continue;
+      EXPECT_THAT(option.meaning, HasSubstr("(default " + FormatNumber(value, 3) + ")")) << name;
     }
   }
 }
