@@ -60,7 +60,7 @@ void PointerTool::Hold(const AuthorView& view, const ui::Gizmo& gizmo, ui::Gizmo
                        const Eigen::Vector2d& point) {
   auto motion = ui::GizmoDrag::Begin(gizmo, part, view.camera, view.PixelAt(point));
   if (!motion) return;
-  Drag drag{std::move(*motion), {}, point, false};
+  Drag drag{std::move(*motion), {}, point};
   for (const std::string& name : selection_->names()) {
     const content::Entity* const entity = view.scene->Find(name);
     if (entity != nullptr && MayMove(*entity))
@@ -83,15 +83,23 @@ void PointerTool::Press(const AuthorView& view, const Eigen::Vector2d& point, bo
     if (!add) selection_->Clear();
     return;
   }
-  if (add || !selection_->Contains(entity->name)) actions_->Select(entity->name, add);
-  if (add || !MayMove(*entity)) return;
-  const auto box = shapes_->BoxOf(*entity, view.eye());
-  if (!box) return;
-  ui::Gizmo ground;
-  ground.origin = OriginOf(*entity, *box);
-  ground.map_from_axes = UprightRotation(*view.scene, *view.frame->tracked.map);
-  ground.length = (ground.origin - view.eye()).norm();
-  Hold(view, ground, ui::GizmoPart::kGround, point);
+  const bool was_selected = selection_->Contains(entity->name);
+  if (add || !was_selected) actions_->Select(entity->name, add);
+  if (add) return;
+  if (const auto box = MayMove(*entity) ? shapes_->BoxOf(*entity, view.eye()) : std::nullopt) {
+    ui::Gizmo ground;
+    ground.origin = OriginOf(*entity, *box);
+    ground.map_from_axes = UprightRotation(*view.scene, *view.frame->tracked.map);
+    ground.length = (ground.origin - view.eye()).norm();
+    Hold(view, ground, ui::GizmoPart::kGround, point);
+  }
+  if (!was_selected) return;
+  // Of several, it is selected alone unless they are dragged together.
+  if (drag_) {
+    drag_->pressed = entity->name;
+  } else {
+    actions_->Select(entity->name, false);
+  }
 }
 
 void PointerTool::Move(const AuthorView& view, const Eigen::Vector2d& point, bool in_steps) {
@@ -103,7 +111,11 @@ void PointerTool::Move(const AuthorView& view, const Eigen::Vector2d& point, boo
 
 void PointerTool::Release() {
   const auto drag = std::exchange(drag_, std::nullopt);
-  if (!drag || !drag->moved) return;
+  if (!drag) return;
+  if (!drag->moved) {
+    if (!drag->pressed.empty()) actions_->Select(drag->pressed, false);
+    return;
+  }
   std::vector<ui::NewPose> poses = drag->held;
   for (ui::NewPose& pose : poses) pose.map_from_entity = drag->motion.motion() * pose.map_from_entity;
   actions_->Transform(poses);

@@ -22,7 +22,8 @@ class PointerTool {
       : selection_(selection), shapes_(shapes), actions_(actions) {}
 
   // The left button was pressed at a point of the window inside the image: holds a handle of the selected
-  // entity, else selects the entity there and holds it. With `add`, it only changes the selection.
+  // entity, else selects the entity there and holds it. With `add`, it only changes the selection. One of
+  // several selected entities is held with the others, and selected alone by a release without a motion.
   void Press(const AuthorView& view, const Eigen::Vector2d& point, bool add);
   // The pointer is at this point. A drag begins when it has moved by a few window units.
   void Move(const AuthorView& view, const Eigen::Vector2d& point, bool in_steps);
@@ -47,6 +48,7 @@ class PointerTool {
     std::vector<ui::NewPose> held;  // At the beginning of the drag.
     Eigen::Vector2d from;           // In the window.
     bool moved = false;
+    std::string pressed = {};  // The entity that a release without a motion selects; empty for none.
   };
 
   // The handles of the selected entity; empty unless exactly one is selected that may be changed.

@@ -1,0 +1,77 @@
+// SPDX-License-Identifier: Apache-2.0
+// Clicks and keys at two boxes before the camera.
+#include "app/command_line/pointer_tool.h"
+
+#include <gmock/gmock.h>
+
+#include "tests/ui/asked_for.h"
+
+namespace docent::app {
+namespace {
+
+using ::testing::ElementsAre;
+
+class PointerAtBoxes : public ::testing::Test {
+ protected:
+  // Carries out what is selected, and keeps the last poses that were asked for.
+  struct Actions : ui::AskedFor {
+    explicit Actions(ui::Selection* selected) : selection(selected) {}
+    void Select(const std::string& name, bool add) override { selection->Select(name, add); }
+    void Transform(const std::vector<ui::NewPose>& asked) override { poses = asked; }
+    ui::Selection* const selection;
+    std::vector<ui::NewPose> poses;
+  };
+
+  PointerAtBoxes() {
+    auto frame = std::make_shared<ShownFrame>();
+    frame->tracked.state = engine::TrackingState::kSixDof;
+    frame->tracked.map_key = 1;
+    frame->tracked.map = std::make_shared<engine::MapSnapshot>();
+    view_.frame = std::move(frame);
+    view_.camera.lens =
+        engine::CameraModel(engine::LensModel::kRadialTangential, {640, 480, 500, 500, 320, 240}, {});
+    view_.image = {0, 0, 640, 480};
+    view_.box = ui::FitImage(640, 480, view_.image);
+    ShowScene();
+  }
+  // Anew, as after a change.
+  void ShowScene() {
+    content::Scene scene;
+    scene.settings.up = Eigen::Vector3d(0, -1, 0);
+    for (const auto& [name, x] : {std::pair("left", -1.0), std::pair("right", 1.0)}) {
+      content::Entity box;
+      box.name = name;
+      box.kind = content::Entity::Kind::kOccluder;
+      box.occluder.map_from_shape.translation = {x, -0.5, 5};
+      scene.entities.push_back(box);
+    }
+    view_.scene = std::make_shared<const content::Scene>(std::move(scene));
+  }
+
+  const Eigen::Vector2d left_{220, 270};  // A point of that box.
+  AuthorView view_;
+  ui::Selection selection_;
+  ui::EntityShapes shapes_;
+  Actions actions_{&selection_};
+  PointerTool tool_{&selection_, &shapes_, &actions_};
+};
+
+TEST_F(PointerAtBoxes, AClickOnOneOfSeveralSelectsItAlone) {
+  selection_.Set({"left", "right"});
+  tool_.Press(view_, left_, false);
+  EXPECT_THAT(selection_.names(), ElementsAre("left", "right")) << "they may be dragged together";
+  tool_.Release();
+  EXPECT_THAT(selection_.names(), ElementsAre("left"));
+}
+
+TEST_F(PointerAtBoxes, SeveralAreDraggedTogetherAndStaySelected) {
+  selection_.Set({"left", "right"});
+  tool_.Press(view_, left_, false);
+  tool_.Move(view_, left_ + Eigen::Vector2d(20, 0), false);
+  tool_.Release();
+  EXPECT_EQ(actions_.poses.size(), 2u);
+  EXPECT_THAT(selection_.names(), ElementsAre("left", "right"));
+}
+
+}  // namespace
+}  // namespace docent::app
