@@ -72,6 +72,7 @@ double AuthorControls::Now() const {
 void AuthorControls::Take(const std::vector<Notice>& notices) {
   for (const Notice& notice : notices) {
     board_.AddError(notice.problem);
+    if (!notice.problem.empty()) pointer_.ForgetSteps();
     if (!notice.done) continue;
     board_.AddDone(DoneText(*notice.done), CanBeUndone(*notice.done), Now());
     leaves_map_ = leaves_map_ || LeavesMap(*notice.done, map_name_);

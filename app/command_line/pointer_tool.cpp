@@ -165,13 +165,16 @@ void PointerTool::Nudge(const AuthorView& view, int right, int away) {
   if (level_right.norm() < 1e-6) return;
   level_right.normalize();
   const Eigen::Vector3d level_away = up.cross(level_right);
+  if (std::exchange(nudged_in_, view.scene) != view.scene) nudged_.clear();
   std::vector<ui::NewPose> poses;
   for (const std::string& name : selection_->names()) {
     const content::Entity* const entity = view.scene->Find(name);
     if (entity == nullptr) continue;
     const double step = kShareOfDistance * (content::PlaceOf(*entity) - view.eye()).norm();
     const Eigen::Vector3d offset = step * (right * level_right + away * level_away);
-    poses.push_back({name, ui::TranslationBy(offset) * ui::TransformOf(*entity, view.eye())});
+    engine::Sim3& pose = nudged_.try_emplace(name, ui::TransformOf(*entity, view.eye())).first->second;
+    pose = ui::TranslationBy(offset) * pose;
+    poses.push_back({name, pose});
   }
   if (!poses.empty()) actions_->Transform(poses);
 }

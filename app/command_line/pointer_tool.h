@@ -2,6 +2,8 @@
 #pragma once
 
 #include <functional>
+#include <map>
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
@@ -39,8 +41,10 @@ class PointerTool {
             ui::SceneOverlay* overlay);
 
   // Moves what is selected along the ground as seen from the camera, by a hundredth of its distance: to the
-  // right and away from the viewer by these steps.
+  // right and away from the viewer by these steps. Steps before the scene shows the last one add up.
   void Nudge(const AuthorView& view, int right, int away);
+  // A change was refused, which may have been that of a step.
+  void ForgetSteps() { nudged_.clear(); }
 
  private:
   struct Drag {
@@ -61,6 +65,9 @@ class PointerTool {
   ui::EntityShapes* const shapes_;
   ui::AuthoringActions* const actions_;
   std::optional<Drag> drag_;
+  // The poses that Nudge asked for last, by name, and the scene that does not have them yet.
+  std::map<std::string, engine::Sim3> nudged_;
+  std::shared_ptr<const content::Scene> nudged_in_;
 };
 
 // The axes of the map's ground: right, up and towards the first viewer.

@@ -73,5 +73,21 @@ TEST_F(PointerAtBoxes, SeveralAreDraggedTogetherAndStaySelected) {
   EXPECT_THAT(selection_.names(), ElementsAre("left", "right"));
 }
 
+TEST_F(PointerAtBoxes, StepsAddUpUntilTheSceneShowsThem) {
+  selection_.Set({"left"});
+  const double step = 0.01 * Eigen::Vector3d(-1, -0.5, 5).norm();
+  for (const int steps : {1, 2}) {
+    tool_.Nudge(view_, 1, 0);
+    ASSERT_EQ(actions_.poses.size(), 1u);
+    EXPECT_NEAR(actions_.poses[0].map_from_entity.translation.x(), -1 + steps * step, 1e-9);
+  }
+  tool_.ForgetSteps();
+  tool_.Nudge(view_, 1, 0);
+  EXPECT_NEAR(actions_.poses[0].map_from_entity.translation.x(), -1 + step, 1e-9);
+  ShowScene();
+  tool_.Nudge(view_, 1, 0);
+  EXPECT_NEAR(actions_.poses[0].map_from_entity.translation.x(), -1 + step, 1e-9);
+}
+
 }  // namespace
 }  // namespace docent::app
