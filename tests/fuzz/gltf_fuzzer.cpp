@@ -19,6 +19,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   try {
     const docent::content::Asset asset =
         docent::content::AssetFromBytes("fuzz", std::vector<std::uint8_t>(data, data + size), limits);
+    if (!asset.model) return 0;  // A sound.
     const int animations = static_cast<int>(asset.model->animations.size());
     for (int i = -1; i < animations && i < 4; ++i) docent::content::NodeMatrices(*asset.model, i, 0.7);
   } catch (const docent::Error&) {
