@@ -68,11 +68,13 @@ TEST_F(HubCrash, AKilledPushLeavesNothingHalfAndLosesNothingAcknowledged) {
     const pid_t child = fork();
     if (child == 0) PushForever(ends[1]);
     close(ends[1]);
+    int acknowledged = first_ - 1, number = 0;
+    EXPECT_EQ(read(ends[0], &number, sizeof number), static_cast<ssize_t>(sizeof number));
+    acknowledged = number;
     random = random * 1664525 + 1013904223;
-    usleep(50'000 + random / 65536 % 400 * 1000);
+    usleep(random / 65536 % 400 * 1000);
     kill(child, SIGKILL);
     waitpid(child, nullptr, 0);
-    int acknowledged = first_ - 1, number = 0;
     while (read(ends[0], &number, sizeof number) == sizeof number) acknowledged = number;
     close(ends[0]);
     const int there = NumberOnHub();
@@ -85,7 +87,6 @@ TEST_F(HubCrash, AKilledPushLeavesNothingHalfAndLosesNothingAcknowledged) {
     first_ = std::stoi(SceneIn(own, own.FindByName("Desk").key).entities[0].signpost.text) + 1;
     EXPECT_EQ(NumberOnHub(), first_ - 1);
   }
-  EXPECT_GT(first_, 1) << "nothing was pushed at all";
 }
 
 TEST_F(HubCrash, AKilledServerLosesNothingAcknowledged) {
