@@ -40,12 +40,12 @@ class SoundPlayerOfAFile : public ::testing::Test {
     std::filesystem::remove_all(folder_ / "device");
   }
   void Play(const std::string& name) {
-    constexpr int kRate = 48'000;
+    constexpr int kWaveRate = 48'000;
     SoundDirector::Orders orders;
     orders.start.emplace_back(SoundDirector::Key{1, name},
                               std::make_shared<content::Asset>(content::AssetFromBytes(
-                                  "tone", content::SoundBytesOf(SF_FORMAT_WAV | SF_FORMAT_PCM_16, 1, kRate,
-                                                                std::size_t{20} * kRate))));
+                                  "tone", content::SoundBytesOf(SF_FORMAT_WAV | SF_FORMAT_PCM_16, 1,
+                                                                kWaveRate, std::size_t{20} * kWaveRate))));
     player_.Give(orders);
   }
   std::string WaitForProblem() {
