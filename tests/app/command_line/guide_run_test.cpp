@@ -2,6 +2,7 @@
 #include "app/command_line/guide_run.h"
 
 #include <gmock/gmock.h>
+#include <spdlog/spdlog.h>
 
 #include <memory>
 #include <string>
@@ -46,7 +47,8 @@ struct EndOfRun {
 EndOfRun RunToItsEnd(const GuideRequest& request, std::vector<CalibratedCamera> cameras) {
   EndOfRun end;
   GuideRun run(request, cameras);
-  testing::internal::CaptureStdout();  // Where the log goes by default.
+  spdlog::set_level(spdlog::level::info);  // A quiet command in the same process lowers it.
+  testing::internal::CaptureStdout();      // Where the log goes by default.
   end.error = ErrorOf([&] { run.Run([](const std::shared_ptr<const ShownFrame>&) {}, {}); });
   end.log = testing::internal::GetCapturedStdout();
   return end;

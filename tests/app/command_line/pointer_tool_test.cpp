@@ -48,7 +48,7 @@ class PointerAtBoxes : public ::testing::Test {
     view_.scene = std::make_shared<const content::Scene>(std::move(scene));
   }
 
-  const Eigen::Vector2d left_{220, 270};  // A point of that box.
+  const Eigen::Vector2d left_{220, 205};  // A point of that box; its ray meets the level plane of the box.
   AuthorView view_;
   ui::Selection selection_;
   ui::EntityShapes shapes_;

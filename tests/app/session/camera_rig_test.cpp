@@ -94,10 +94,10 @@ TEST(Rig, IsRecognizedAsRigidFromUnsynchronizedCameras) {
 }
 
 TEST(Rig, IsRecognizedAtEightImagesASecond) {
-  const engine::CameraRig rig = Watch(20, [](double) { return Rigid3(); }, 1, {125, 125});
+  const engine::CameraRig rig = Watch(8, [](double) { return Rigid3(); }, 1, {125, 125});
   ASSERT_TRUE(rig.estimate());
   EXPECT_TRUE(rig.estimate()->rigid) << TextOf(*rig.estimate());
-  EXPECT_TRUE(rig.Predict(1, FromSeconds(20), 1));
+  EXPECT_TRUE(rig.Predict(1, FromSeconds(8), 1));
 }
 
 TEST(Rig, IsNotRigidWhenTheCamerasMoveRelativeToEachOther) {

@@ -5,6 +5,7 @@
 #include <stdlib.h>
 
 #include <chrono>
+#include <cstdlib>
 #include <filesystem>
 #include <fstream>
 #include <functional>
@@ -33,6 +34,7 @@ TEST(Speech, SpeaksAgainOnceTheServiceIsBack) {
   std::ofstream(folder / "spd-say") << "#!/bin/sh\n[ -e '" << (folder / "service").string()
                                     << "' ] || exit 1\n: > '" << (folder / "spoken").string() << "'\n";
   std::filesystem::permissions(folder / "spd-say", std::filesystem::perms::owner_all);
+  const std::string path = std::getenv("PATH") != nullptr ? std::getenv("PATH") : "";
   setenv("PATH", (folder / "").c_str(), 1);
   Speech speech("en", std::chrono::milliseconds(0));
   speech.Say("one");
@@ -42,6 +44,7 @@ TEST(Speech, SpeaksAgainOnceTheServiceIsBack) {
   std::ofstream(folder / "service") << "";
   speech.Say("two");
   EXPECT_TRUE(WaitForSpeech([&] { return std::filesystem::exists(folder / "spoken"); }));
+  setenv("PATH", path.c_str(), 1);
 }
 
 }  // namespace
