@@ -255,9 +255,10 @@ bool IsSameFile(const std::filesystem::path& a, const std::filesystem::path& b) 
   namespace fs = std::filesystem;
   std::error_code error;
   if (fs::equivalent(a, b, error)) return true;
-  const fs::path whole_a = fs::weakly_canonical(a, error);
+  // A relative name none of whose folders exists would stay relative.
+  const fs::path whole_a = fs::weakly_canonical(fs::absolute(a, error), error);
   if (error) return false;
-  const fs::path whole_b = fs::weakly_canonical(b, error);
+  const fs::path whole_b = fs::weakly_canonical(fs::absolute(b, error), error);
   return !error && whole_a == whole_b;
 }
 

@@ -86,7 +86,7 @@ void MakeFolder(const std::filesystem::path& folder) {
 bool LiesWithin(const std::filesystem::path& path, const std::filesystem::path& place) {
   namespace fs = std::filesystem;
   std::error_code error;
-  fs::path part = fs::weakly_canonical(path, error);
+  fs::path part = fs::weakly_canonical(fs::absolute(path, error), error);
   if (error) part = path.lexically_normal();
   for (; !part.empty(); part = part.parent_path()) {
     if (fs::equivalent(part, place, error)) return true;
