@@ -24,45 +24,77 @@ namespace docent::app {
 namespace {
 
 using ::testing::AllOf;
-using ::testing::Contains;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
 using ::testing::Not;
 using ::testing::StartsWith;
 
-// The subcommands that a help lists, one a line; further lines of a description are indented by more.
-std::vector<std::string> SubcommandsIn(const std::string& help) {
-  std::istringstream lines(help);
-  std::string line;
-  while (std::getline(lines, line) && line != "Subcommands:") {
-  }
-  std::vector<std::string> names;
-  while (std::getline(lines, line) && line.starts_with("  ")) {
-    if (line[2] != ' ') names.push_back(line.substr(2, line.find(' ', 2) - 2));
-  }
-  return names;
-}
-
 TEST(CommandLine, HelpShowsAnExampleForEverySubcommand) {
-  using Command = std::vector<std::string>;
-  std::vector<Command> commands = {{}};
-  for (std::size_t i = 0; i < commands.size(); ++i) {
-    const Command command = commands[i];
-    Command arguments = command;
-    arguments.push_back("--help");
-    const Outcome outcome = RunDocent(arguments);
+  const Outcome top = RunDocent({"--help"});
+  EXPECT_EQ(top.exit_status, 0);
+  EXPECT_THAT(top.errors, IsEmpty());
+  const std::vector<std::vector<std::string>> commands = {
+      {},
+      {"demo"},
+      {"author"},
+      {"tour"},
+      {"evaluate"},
+      {"calibrate"},
+      {"cameras"},
+      {"simulate"},
+      {"report"},
+      {"train-vocabulary"},
+      {"maps"},
+      {"maps", "list"},
+      {"maps", "show"},
+      {"maps", "verify"},
+      {"maps", "rename"},
+      {"maps", "remove"},
+      {"maps", "policy"},
+      {"maps", "export"},
+      {"maps", "import"},
+      {"maps", "optimize"},
+      {"maps", "densify"},
+      {"maps", "join"},
+      {"maps", "recover"},
+      {"maps", "tour"},
+      {"maps", "tour", "list"},
+      {"maps", "tour", "show"},
+      {"maps", "tour", "create"},
+      {"maps", "tour", "edit"},
+      {"maps", "tour", "rename"},
+      {"maps", "tour", "remove"},
+      {"maps", "push"},
+      {"maps", "pull"},
+      {"hub"},
+      {"hub", "init"},
+      {"hub", "status"},
+      {"hub", "revert"},
+      {"hub", "backup"},
+      {"hub", "restore"},
+      {"hub", "hand-in"},
+      {"hub", "collect"},
+      {"hub", "user"},
+      {"hub", "user", "add"},
+      {"hub", "user", "remove"},
+      {"hub", "user", "list"},
+      {"content"},
+      {"content", "list"},
+      {"content", "add"},
+      {"content", "import"},
+      {"content", "edit"},
+      {"content", "remove"},
+  };
+  for (std::vector<std::string> command : commands) {
+    if (command.size() == 1) {
+      EXPECT_THAT(top.output, HasSubstr("\n  " + command[0] + " "));
+    }
+    command.push_back("--help");
+    const Outcome outcome = RunDocent(command);
     EXPECT_EQ(outcome.exit_status, 0) << testing::PrintToString(command);
     EXPECT_THAT(outcome.output, AllOf(HasSubstr("Usage:"), HasSubstr("Example:\n  docent")));
     EXPECT_THAT(outcome.errors, IsEmpty());
-    for (const std::string& name : SubcommandsIn(outcome.output)) {
-      commands.push_back(command);
-      commands.back().push_back(name);
-    }
   }
-  for (const Command& command :
-       {Command{"demo"}, Command{"report"}, Command{"maps", "tour", "create"}, Command{"maps", "pull"},
-        Command{"hub", "user", "list"}, Command{"content", "remove"}})
-    EXPECT_THAT(commands, Contains(command));
 }
 
 TEST(CommandLine, SaysThatATourEstimatesNoCalibration) {
