@@ -29,13 +29,12 @@ bool IsStillAt(int file, const std::filesystem::path& path) {
          open_file.st_ino == named.st_ino && open_file.st_dev == named.st_dev;
 }
 
-// Returns the locked file, or -1 if the other kind holds it.
-int TryLock(const std::filesystem::path& path, SessionLockKind kind) {
+// Returns the locked file, or -1 if another holder is in the way. operation: LOCK_SH or LOCK_EX.
+int TryLock(const std::filesystem::path& path, int operation) {
   while (true) {
     const int file = open(path.c_str(), O_RDWR | O_CREAT | O_CLOEXEC | O_NOFOLLOW, 0666);
     if (file < 0)
       throw Error(path.string() + " cannot be created: " + std::generic_category().message(errno));
-    const int operation = kind == SessionLockKind::kSession ? LOCK_SH : LOCK_EX;
     if (flock(file, operation | LOCK_NB) != 0) {
       const int error = errno;
       close(file);
@@ -47,11 +46,21 @@ int TryLock(const std::filesystem::path& path, SessionLockKind kind) {
   }
 }
 
-// Whether those who hold the lock share it, and are therefore sessions.
+// Whether the lock is held in shared mode, and therefore by a session.
 bool IsShared(const std::filesystem::path& path) {
-  const int file = TryLock(path, SessionLockKind::kSession);
+  const int file = TryLock(path, LOCK_SH);
   if (file >= 0) close(file);
   return file >= 0;
+}
+
+int TryLockFor(SessionLockKind kind, const std::filesystem::path& path) {
+  const int file = TryLock(path, LOCK_EX);
+  if (file < 0 || kind == SessionLockKind::kReplace) return file;
+  // Who may hold it exclusively is the only session, and shows with a shared lock that it is one. The system
+  // may give the lock to another in between.
+  if (flock(file, LOCK_SH | LOCK_NB) == 0 && IsStillAt(file, path)) return file;
+  close(file);
+  return -1;
 }
 
 }  // namespace
@@ -60,11 +69,16 @@ SessionLock::SessionLock(const std::filesystem::path& library, SessionLockKind k
     : path_(library.string() + ".session") {
   const auto end = std::chrono::steady_clock::now() + kLongestWait;
   int shared = 0;
-  while ((file_ = TryLock(path_, kind)) < 0) {
-    if (kind == SessionLockKind::kReplace && IsShared(path_) && ++shared == kAttemptsBesideSessions)
-      throw LibraryInSession(library.string() +
-                             " is open in docent author, which could save its maps over the change; do it "
-                             "again when that session has ended");
+  while ((file_ = TryLockFor(kind, path_)) < 0) {
+    if (IsShared(path_) && ++shared == kAttemptsBesideSessions) {
+      throw LibraryInSession(
+          library.string() +
+          (kind == SessionLockKind::kSession
+               ? " is already open in docent author; end that session first, because two would "
+                 "save over each other's maps"
+               : " is open in docent author, which could save its maps over the change; do "
+                 "it again when that session has ended"));
+    }
     if (std::chrono::steady_clock::now() > end)
       throw Error(library.string() +
                   " is being changed by another command or from a hub; try again when that has ended");

@@ -151,6 +151,10 @@ TEST_F(HubSessionLock, TheProgramSaysThatASessionHasTheLibraryOpen) {
     EXPECT_EQ(refused.exit_status, 1) << change[1];
     EXPECT_THAT(refused.errors, HasSubstr("is open in docent author")) << change[1];
   }
+  const app::Outcome second = app::RunDocent(
+      {"author", "--headless", "--library", (folder_ / "b").string(), "--camera", "sim:room,duration=1"});
+  EXPECT_EQ(second.exit_status, 1);
+  EXPECT_THAT(second.errors, HasSubstr("is already open in docent author"));
   kill(author, SIGKILL);  // A session that ended so leaves the file, but not the lock.
   int status = 0;
   waitpid(author, &status, 0);
@@ -160,18 +164,16 @@ TEST_F(HubSessionLock, TheProgramSaysThatASessionHasTheLibraryOpen) {
   EXPECT_EQ(TextsOn("b"), "Hello;from a;");
 }
 
-TEST(SessionLock, SessionsShareItAndTheLastOneRemovesTheFile) {
+TEST(SessionLock, ASessionHasTheLibraryForItselfAndRemovesTheFile) {
   const TemporaryFolder folder;
   const std::filesystem::path library = folder / "m.docent";
   {
-    const SessionLock first(library, SessionLockKind::kSession);
-    {
-      const SessionLock second(library, SessionLockKind::kSession);
-      EXPECT_THROW(SessionLock(library, SessionLockKind::kReplace), LibraryInSession);
-    }
+    const SessionLock session(library, SessionLockKind::kSession);
+    EXPECT_THROW(SessionLock(library, SessionLockKind::kSession), LibraryInSession);
     EXPECT_THROW(SessionLock(library, SessionLockKind::kReplace), LibraryInSession);
   }
   EXPECT_EQ(FilesIn(folder.path()), "");
+  { const SessionLock next(library, SessionLockKind::kSession); }
   { const SessionLock replacing(library, SessionLockKind::kReplace); }
   EXPECT_EQ(FilesIn(folder.path()), "");
 }
