@@ -8,11 +8,9 @@ RunSounds::RunSounds(const GuideRequest& request)
   if (request.sound) player_.emplace();
 }
 
-void RunSounds::Ask(std::span<const SoundDirector::Key> sounds) {
-  for (const auto& [map_key, name] : sounds) director_.Ask(map_key, name);
-}
-
-std::vector<Event> RunSounds::Add(ShownFrame* frame) {
+std::vector<Event> RunSounds::Add(ShownFrame* frame, std::span<const SoundDirector::Key> asked) {
+  if (std::exchange(visitors_before_, frame->visitors_before) != frame->visitors_before) director_.BeginAnew();
+  for (const auto& [map_key, name] : asked) director_.Ask(map_key, name);
   static const content::Scene kNoScene;
   const engine::TrackedFrame& tracked = frame->tracked;
   // A visitor's pose that is not believed (see VisitorGuide) has no content, or that of the last pose before.

@@ -24,11 +24,9 @@ class RunSounds {
  public:
   explicit RunSounds(const GuideRequest& request);
 
-  // A visitor asks for these sounds; see SoundDirector::Ask.
-  void Ask(std::span<const SoundDirector::Key> sounds);
-  // Starts and stops sounds for a frame of the first camera, and sets its caption. Returns the events of
-  // this.
-  std::vector<Event> Add(ShownFrame* frame);
+  // Starts and stops sounds for a frame of the first camera, and sets its caption. asked: what its visitor
+  // asks for; see SoundDirector::Ask. Returns the events of this.
+  std::vector<Event> Add(ShownFrame* frame, std::span<const SoundDirector::Key> asked = {});
   // The first camera's image with this index, or a later one, is on the screen.
   void HandleShown(std::uint64_t index);
   // Why something is not heard, as a sentence, once; empty otherwise.
@@ -37,6 +35,7 @@ class RunSounds {
  private:
   const bool waits_for_screen_;
   SoundDirector director_;
+  int visitors_before_ = 0;            // See ShownFrame.
   std::optional<SoundPlayer> player_;  // Only if sounds are to be heard.
   // What is to be heard with an image that is not on the screen yet, with the image's index.
   std::deque<std::pair<std::uint64_t, SoundDirector::Orders>> undrawn_;

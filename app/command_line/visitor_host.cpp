@@ -75,6 +75,7 @@ void VisitorHost::BeginAnew(Timestamp time, const std::string& why) {
   if (request_.route) route_.emplace(*request_.route);
   for (std::size_t i = 0; i < visitors_.size(); ++i) Welcome(i);
   if (narration_) narration_.emplace(strings_);
+  asked_sounds_.clear();
   if (visits_) visits_->Next();
   report_({time, request_.kiosk_code.empty() ? "tour" : "kiosk", why});
 }

@@ -17,10 +17,16 @@ bool SoundDirector::IsHeard(const content::Sound& sound, const Eigen::Vector3d& 
   return (camera - sound.position).norm() <= sound.range * (was_near ? kLeaveRatio : 1);
 }
 
+void SoundDirector::BeginAnew() {
+  for (const auto& [key, left] : std::exchange(near_, {})) left_.push_back(key);
+  asked_.clear();
+}
+
 SoundDirector::Orders SoundDirector::Update(double seconds, std::uint64_t map_key,
                                             const content::Scene& scene,
                                             const std::optional<Eigen::Vector3d>& camera_in_map) {
   Orders orders;
+  orders.stop = std::exchange(left_, {});
   if (camera_in_map) {
     const std::set<Key> asked = std::exchange(asked_, {});
     std::map<Key, Near> near;

@@ -34,6 +34,8 @@ class SoundDirector {
   // A visitor asks for a sound: it begins anew with the next frame that has a place, wherever that is, and
   // plays to its end.
   void Ask(std::uint64_t map_key, const std::string& name) { asked_.insert({map_key, name}); }
+  // For the next visitor, everything begins anew, and what plays stops with the next frame.
+  void BeginAnew();
   // A frame whose camera is at this place in the map with this key; without a place, what plays goes on.
   Orders Update(double seconds, std::uint64_t map_key, const content::Scene& scene,
                 const std::optional<Eigen::Vector3d>& camera_in_map);
@@ -49,6 +51,7 @@ class SoundDirector {
   const std::string language_;
   std::map<Key, Near> near_;  // The sounds that the camera is within the range of, and those asked for.
   std::set<Key> asked_;       // Since the last frame with a place.
+  std::vector<Key> left_;     // What the visitor before has left playing.
 };
 
 }  // namespace docent::app

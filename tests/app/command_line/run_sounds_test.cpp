@@ -49,5 +49,20 @@ TEST(RunSounds, ASoundGoesOnWhileThePoseIsNotBelieved) {
   EXPECT_EQ(frame.caption, "") << "the camera has left it";
 }
 
+TEST(RunSounds, TheNextVisitorHearsWhatTheOneBeforeHasHeard) {
+  const GuideRequest request;
+  RunSounds sounds(request);
+  ShownFrame frame = FrameAtSound(0);
+  EXPECT_EQ(sounds.Add(&frame).size(), 1u);
+  frame = FrameAtSound(30);
+  EXPECT_TRUE(sounds.Add(&frame).empty());
+  frame = FrameAtSound(31);
+  frame.visitors_before = 1;
+  EXPECT_EQ(sounds.Add(&frame).size(), 1u);
+  frame = FrameAtSound(32);
+  frame.visitors_before = 1;
+  EXPECT_TRUE(sounds.Add(&frame).empty());
+}
+
 }  // namespace
 }  // namespace docent::app

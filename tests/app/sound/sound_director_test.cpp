@@ -118,6 +118,26 @@ TEST(SoundDirector, StopsWhatIsRemovedHiddenOrInAnotherMap) {
   }
 }
 
+TEST(SoundDirector, EverythingBeginsAnewForTheNextVisitor) {
+  OneSound one;
+  const SoundDirector::Key roar(1, "roar");
+  EXPECT_EQ(one.At(0, 1).start.size(), 1u);
+  EXPECT_TRUE(one.At(20, 1).start.empty()) << "the visitor has heard it";
+  one.director.Ask(1, "roar");
+  one.director.BeginAnew();
+  // The camera is lost, because the device lies on a table.
+  const auto lost = one.director.Update(21, 0, {}, std::nullopt);
+  EXPECT_EQ(lost.stop, std::vector<SoundDirector::Key>{roar});
+  EXPECT_EQ(lost.caption, "");
+  EXPECT_TRUE(one.At(22, 3).start.empty()) << "what the visitor before has asked for";
+  EXPECT_EQ(one.At(23, 1).start.size(), 1u);
+  one.director.BeginAnew();
+  const auto again = one.At(24, 1);
+  EXPECT_EQ(again.stop, std::vector<SoundDirector::Key>{roar});
+  ASSERT_EQ(again.start.size(), 1u) << "for a visitor who begins where the sound is";
+  EXPECT_EQ(again.start[0].first, roar);
+}
+
 TEST(SoundDirector, CaptionsAreInTheReadersLanguage) {
   content::Scene scene{{SoundAt("roar", Eigen::Vector3d::Zero(), 2, 10), SoundAt("bell", {1, 0, 0}, 2, 10)}};
   SoundDirector director("de-at");
