@@ -136,9 +136,9 @@ void VisitorControls::HandleKey(const ui::InputEvent& event, Clock::time_point n
     }
   }
   if (key == "left" || key == "right" || key == "up" || key == "down") HandleArrow(key);
-  if (host_.has_route) {
-    if (key == "m" && !is_asked_) OpenMenu(Menu::kSteps);
-    if (key == "r" && !is_asked_) OpenMenu(Menu::kAnew);
+  if (host_.has_route && !is_asked_) {
+    if (key == "m") OpenMenu(Menu::kSteps);
+    if (key == "r") OpenMenu(Menu::kAnew);
     if (key == "n") Step(GuideVisitor::Step::kSkip);
     if (key == "b") Step(GuideVisitor::Step::kBack);
     if (key == "l") lists_route_ = !lists_route_;

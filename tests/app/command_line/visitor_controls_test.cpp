@@ -214,8 +214,9 @@ TEST_F(VisitorAtControls, WhoTakesADeviceThatWasLeftIsAskedOnce) {
   Show({}, true);
   ASSERT_EQ(Drawn().visitor->menu.size(), 2u);
   Touch(3, 3);
-  Key("m");
+  for (const char* key : {"m", "n", "b", "l"}) Key(key);
   EXPECT_EQ(Drawn().visitor->menu.size(), 2u) << "a hand that takes up the device answers nothing";
+  EXPECT_FALSE(Drawn().visitor->lists_route);
   const ui::MenuLayout open = ui::LayOutMenu(*Drawn().visitor, 1280, 800, {1.5, 0, 36});
   Touch(open.choices[1].x + 9, open.choices[1].y + 9);
   EXPECT_THAT(Given(), ElementsAre("tour restart"));
