@@ -77,11 +77,15 @@ void AuthorControls::Take(const std::vector<Notice>& notices) {
     board_.AddDone(DoneText(*notice.done), CanBeUndone(*notice.done), Now());
     leaves_map_ = leaves_map_ || LeavesMap(*notice.done, map_name_);
     if (const auto* renamed_map = std::get_if<app::RenameMap>(&*notice.done)) {
-      for (std::string* name : {&map_name_, &copied_from_}) {
+      for (std::string* name : {&map_name_, &copied_from_, &panel_.choices().sign_to_map}) {
         if (*name == renamed_map->name) *name = renamed_map->new_name;
       }
     }
     if (const auto* renamed = std::get_if<RenameEntity>(&*notice.done)) {
+    if (const auto* removed_map = std::get_if<app::RemoveMap>(&*notice.done)) {
+      std::string& to_map = panel_.choices().sign_to_map;
+      if (to_map == removed_map->name) to_map.clear();
+    }
       selection_.Rename(renamed->name, renamed->new_name);
       if (copied_from_ == map_name_) std::ranges::replace(copied_names_, renamed->name, renamed->new_name);
     }

@@ -222,6 +222,14 @@ TEST_F(AuthorAtControls, WhatWasCopiedIsPastedUnderItsNewNames) {
   EXPECT_THAT(commands_, ElementsAre(Command(PasteEntities{{"Cove"}, "Lobby", std::nullopt})));
 }
 
+TEST_F(AuthorAtControls, TheMapThatSignpostsAreToLeadToIsKnownByItsNewNameUntilItIsRemoved) {
+  controls_->choices().sign_to_map = "Hall";
+  controls_->Take({Notice{"", RenameMap{"Hall", "Lobby"}}, Notice{"", RemoveMap{"Room"}}});
+  EXPECT_EQ(controls_->choices().sign_to_map, "Lobby");
+  controls_->Take({Notice{"", RemoveMap{"Lobby"}}});
+  EXPECT_EQ(controls_->choices().sign_to_map, "");
+}
+
 TEST_F(AuthorAtControls, WhatIsBeingWrittenIsACommandBeforeThePanelCloses) {
   WriteName();
   // Both keys come in one frame, as from a slow machine.
