@@ -73,6 +73,7 @@ void AuthorControls::Take(const std::vector<Notice>& notices) {
   for (const Notice& notice : notices) {
     board_.AddError(notice.problem);
     if (!notice.problem.empty()) pointer_.ForgetSteps();
+    if (notice.activity) board_.AddDone(*notice.activity, false, Now());
     if (!notice.done) continue;
     board_.AddDone(DoneText(*notice.done), CanBeUndone(*notice.done), Now());
     leaves_map_ = leaves_map_ || LeavesMap(*notice.done, map_name_);
@@ -81,11 +82,11 @@ void AuthorControls::Take(const std::vector<Notice>& notices) {
         if (*name == renamed_map->name) *name = renamed_map->new_name;
       }
     }
-    if (const auto* renamed = std::get_if<RenameEntity>(&*notice.done)) {
     if (const auto* removed_map = std::get_if<app::RemoveMap>(&*notice.done)) {
       std::string& to_map = panel_.choices().sign_to_map;
       if (to_map == removed_map->name) to_map.clear();
     }
+    if (const auto* renamed = std::get_if<RenameEntity>(&*notice.done)) {
       selection_.Rename(renamed->name, renamed->new_name);
       if (copied_from_ == map_name_) std::ranges::replace(copied_names_, renamed->name, renamed->new_name);
     }

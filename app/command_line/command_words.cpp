@@ -131,6 +131,10 @@ std::string DoneText(const Command& command) {
   return std::visit(DoneWriter{}, command);
 }
 
+std::string ReadingText(const std::string& file) {
+  return "Reading " + std::filesystem::path(file).filename().string() + "…";
+}
+
 bool CanBeUndone(const Command& command) {
   return !IsOneOf<NewMap, StopMap, UseMap, SetPolicy, RenameMap, RemoveMap, JoinMap, GuideVisitor, Undo, Redo,
                   Save>(command);

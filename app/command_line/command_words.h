@@ -9,6 +9,8 @@ namespace docent::app {
 
 // What a command has done, for the person who gave it: "Placed fox.glb."
 std::string DoneText(const Command& command);
+// While a file is read.
+std::string ReadingText(const std::string& file);
 // Whether undo takes the command back.
 bool CanBeUndone(const Command& command);
 

@@ -9,6 +9,7 @@
 #include <functional>
 #include <utility>
 
+#include "app/command_line/command_words.h"
 #include "app/command_line/interruption.h"
 #include "app/files/text_file.h"
 #include "app/output/engine_text.h"
@@ -301,6 +302,9 @@ CameraRun GuideRun::RunOf(std::size_t i, const Show& show) {
     return host_ && host_->Lead(command, frame);
   };
   run.options.refused = [this, &state](const std::string& reason) { HandleRefused(reason, &state); };
+  run.options.reading = [this](const std::string& file) {
+    if (has_author_window()) notices_.Push({"", std::nullopt, ReadingText(file)});
+  };
   run.options.carried_out = [this, i, &state](const TimedCommand& command) {
     HandleCarriedOut(command, i, &state);
   };
@@ -484,8 +488,9 @@ void GuideRun::Direct(const std::shared_ptr<const ShownFrame>& frame) {
 }
 
 void GuideRun::PlaySounds(ShownFrame* frame) {
-  if (host_) sounds_.Ask(host_->TakeAskedSounds());
-  files_->Add(sounds_.Add(frame));
+  const std::vector<SoundDirector::Key> asked =
+      host_ ? host_->TakeAskedSounds() : std::vector<SoundDirector::Key>();
+  files_->Add(sounds_.Add(frame, asked));
   ReportProblem(sounds_.TakeProblem(), frame->tracked.frame.time);
 }
 

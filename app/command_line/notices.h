@@ -17,6 +17,7 @@ struct Notice {
   // Why a command was refused, or what went wrong: one sentence. Empty for a command that was carried out.
   std::string problem;
   std::optional<Command> done;
+  std::optional<std::string> activity = std::nullopt;  // What is going on, in a few words.
 };
 
 // What is not saved yet, and when something was saved last.

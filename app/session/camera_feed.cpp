@@ -109,8 +109,9 @@ void CameraFeed::ReportUntracked() {
   }
 }
 
-void CameraFeed::CarryOutGiven() {
-  if (last_tracked_) command_runner_.RunGiven(last_tracked_->frame.time - *first_time_, *last_tracked_);
+void CameraFeed::CarryOutGiven(bool waits) {
+  if (last_tracked_)
+    command_runner_.RunGiven(last_tracked_->frame.time - *first_time_, *last_tracked_, waits);
 }
 
 void CameraFeed::Disconnect() {

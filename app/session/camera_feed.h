@@ -62,8 +62,8 @@ class CameraFeed {
   // Carries out what the person wants while there is no other image, `passed` after the last one.
   void CarryOut(Timestamp passed, bool at_end);
   // Carries out what the person wanted since the last image: while images are dropped or missing, and after
-  // the last one.
-  void CarryOutGiven();
+  // the last one. waits: for files that have to be read.
+  void CarryOutGiven(bool waits = false);
   // The time between two calls of CarryOut.
   static void Rest(const std::stop_token& stop);
   // There are no more images of this camera, while others go on.

@@ -2,7 +2,10 @@
 #include "app/session/command_runner.h"
 
 #include <algorithm>
+#include <new>
+#include <utility>
 
+#include "app/session/session_assets.h"
 #include "engine/base/error.h"
 
 namespace docent::app {
@@ -19,17 +22,40 @@ void CommandRunner::RunDue(Timestamp now, const engine::TrackedFrame& frame) {
   RunGiven(now, frame);
 }
 
-void CommandRunner::RunGiven(Timestamp now, const engine::TrackedFrame& frame) {
+void CommandRunner::RunGiven(Timestamp now, const engine::TrackedFrame& frame, bool waits) {
   if (options_.inbox == nullptr) return;
-  for (const CommandInbox::Entry& entry : options_.inbox->TakeAll()) {
+  for (CommandInbox::Entry& entry : options_.inbox->TakeAll()) given_.push_back(std::move(entry));
+  while (!given_.empty() && (!IsReading() || waits)) {
+    const CommandInbox::Entry entry = std::move(given_.front());
+    given_.pop_front();
     try {
+      if (const auto reading = std::exchange(reading_, nullptr)) reading->Join();
       const engine::TrackedFrame& seen = entry.frame ? *entry.frame : frame;
       // Recorded with the time of the frame that the user saw, so that its pixel keeps its meaning on replay.
       Run(entry.command, now - (frame.frame.time - seen.frame.time), seen);
     } catch (const Error& error) {
       if (options_.refused) options_.refused(error.what());
+    } catch (const std::bad_alloc&) {
+      if (options_.refused) options_.refused("there is not enough memory for this");
     }
   }
+}
+
+bool CommandRunner::IsReading() {
+  constexpr auto kLong = std::chrono::milliseconds(500);
+  const Command& command = given_.front().command;
+  const auto now = std::chrono::steady_clock::now();
+  if (!reading_ && options_.pace != Pace::kLockstep && session_->MustRead(command, options_.model_folder)) {
+    reading_ = std::make_unique<Worker>("asset", [this, command](const std::stop_token&) {
+      session_->Preload(command, options_.model_folder);
+    });
+    read_since_ = now;
+    is_reading_reported_ = false;
+  }
+  if (!reading_ || reading_->finished()) return false;
+  if (options_.reading && now - read_since_ >= kLong && !std::exchange(is_reading_reported_, true))
+    options_.reading(FileOf(command)->name);
+  return true;
 }
 
 void CommandRunner::CheckAllDone() const {

@@ -167,7 +167,7 @@ void RunCameras(const std::vector<CameraRun>& cameras, Session* session, const s
     if (cameras.front().options.stays) StayAtEnd(&feeds, stop);
   }
   // A person who quits has given these commands before.
-  for (CameraFeed& feed : feeds) feed.CarryOutGiven();
+  for (CameraFeed& feed : feeds) feed.CarryOutGiven(true);
 }
 
 void RunFrames(CalibratedCamera* camera, Session* session, const FrameLoopOptions& options,

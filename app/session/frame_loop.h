@@ -57,6 +57,9 @@ struct FrameLoopOptions {
   // the camera's thread and may be empty.
   std::function<void(const TimedCommand&)> carried_out;
   std::function<void(const std::string&)> refused;
+  // Called once with the name of a file that a command of the inbox places, when reading it has taken half a
+  // second. On the camera's thread; may be empty.
+  std::function<void(const std::string&)> reading;
   // Called when the source cannot deliver images, with a sentence for the wearer and the time on its clock,
   // and with an empty sentence when it delivers again. On the camera's thread; may be empty.
   std::function<void(const std::string&, Timestamp)> trouble;

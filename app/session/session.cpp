@@ -102,6 +102,7 @@ void Session::Execute(const Command& command, const engine::TrackedFrame& frame,
   }
   if (const std::string problem = Validate(command); !problem.empty()) throw Error(problem);
   memory_.LoadFor(command);
+  Preload(command, model_folder);
   std::unique_lock lock(mutex_);
   event_handler_.HandleEvents();
   assets_.SetFolder(model_folder);
@@ -119,15 +120,21 @@ void Session::Execute(const Command& command, const engine::TrackedFrame& frame,
   state_.AddEvent(frame.frame.time, "command", FormatCommand(command));
 }
 
+bool Session::MustRead(const Command& command, const std::filesystem::path& model_folder) {
+  const std::optional<AssetFile> file = FileOf(command);
+  if (!file) return false;
+  const std::scoped_lock lock(mutex_);
+  assets_.SetFolder(model_folder);
+  return !assets_.Find(file->name, file->kind);
+}
+
 void Session::Preload(const Command& command, const std::filesystem::path& model_folder) {
-  const auto load = [&](const std::string& file, content::AssetKind kind) {
-    const std::scoped_lock lock(mutex_);
-    assets_.SetFolder(model_folder);
-    assets_.Load(file, kind);
-  };
-  if (const auto* model = std::get_if<PlaceModel>(&command)) load(model->file, content::AssetKind::kModel);
-  if (const auto* image = std::get_if<PlaceImage>(&command)) load(image->file, content::AssetKind::kImage);
-  if (const auto* sound = std::get_if<PlaceSound>(&command)) load(sound->file, content::AssetKind::kSound);
+  if (!MustRead(command, model_folder)) return;
+  const std::optional<AssetFile> file = FileOf(command);
+  SessionAssets::Decoded decoded = SessionAssets::Decode(model_folder, file->name, file->kind);
+  const std::scoped_lock lock(mutex_);
+  assets_.SetFolder(model_folder);
+  assets_.Keep(file->name, file->kind, std::move(decoded));
 }
 
 void Session::ReloadContent(const std::vector<std::uint64_t>& keys) {

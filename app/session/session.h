@@ -72,8 +72,10 @@ class Session {
   // model files are searched in model_folder first (a script's own folder), then in the working folder.
   void Execute(const Command& command, const engine::TrackedFrame& frame,
                const std::filesystem::path& model_folder = {});
-  // Reads the model of a command in advance, so that an error shows before anything is built, and no frame
-  // waits for it. Throws Error.
+  // Whether the command's model, image or sound is not known yet, or was written anew since.
+  bool MustRead(const Command& command, const std::filesystem::path& model_folder);
+  // Reads the model, image or sound of a command in advance, so that an error shows before anything is built,
+  // and no frame waits for it. Any thread. Throws Error.
   void Preload(const Command& command, const std::filesystem::path& model_folder);
 
   // Shows the content that other programs have stored for these maps of the library since. Call it on a

@@ -384,6 +384,60 @@ TEST(FrameLoop, CarriesOutWhatAPersonWantsJustBeforeQuitting) {
   }
 }
 
+// A surface of many triangles, which takes long to read.
+std::string LargeModel() {
+  constexpr int kSide = 300;
+  std::string text;
+  for (int y = 0; y < kSide; ++y) {
+    for (int x = 0; x < kSide; ++x) text += "v " + std::to_string(x) + " " + std::to_string(y) + " 0\n";
+  }
+  for (int i = 1; i + kSide + 1 <= kSide * kSide; ++i) {
+    text += "f " + std::to_string(i) + " " + std::to_string(i + 1) + " " + std::to_string(i + kSide) + "\n";
+  }
+  return text;
+}
+
+TEST(FrameLoop, TracksOnWhileAFileThatIsToBePlacedIsRead) {
+  const TemporaryFolder folder;
+  folder.Write("large.obj", LargeModel());
+  for (const Pace pace : {Pace::kEager, Pace::kRealtime, Pace::kLockstep}) {
+    CalibratedCamera camera = Calibrate(std::make_unique<Recording>(6), std::nullopt);
+    SessionOptions options;
+    options.threaded = pace != Pace::kLockstep;
+    Session session(options, {camera.model}, nullptr);
+    CommandInbox inbox;
+    FrameLoopOptions loop;
+    loop.pace = pace;
+    loop.inbox = &inbox;
+    loop.model_folder = folder.path();
+    std::vector<std::string> refused;
+    loop.refused = [&](const std::string& reason) { refused.push_back(reason); };
+    std::vector<std::pair<std::size_t, std::uint64_t>> taken;
+    loop.take = [&](const Command& command, const engine::TrackedFrame& frame) {
+      taken.emplace_back(command.index(), frame.frame.index);
+      return true;
+    };
+    RunFrames(&camera, &session, loop,
+              [&](const engine::TrackedFrame& frame) {
+                if (frame.frame.index != 1) return;
+                inbox.Push({PlaceModel{"large.obj", {1, 2}, std::nullopt, 0}, nullptr});
+                inbox.Push({PlaceModel{"none.obj", {1, 2}, std::nullopt, 0}, nullptr});
+                inbox.Push({Undo{}, nullptr});
+              },
+              {});
+    ASSERT_GE(taken.size(), 2u) << ToString(pace);
+    EXPECT_EQ(taken.front().first, Command(PlaceModel{}).index());
+    EXPECT_EQ(taken.back().first, Command(Undo{}).index()) << "the commands keep their order";
+    if (pace == Pace::kLockstep) {
+      EXPECT_EQ(taken.front().second, 2u) << "what is done depends on the images alone";
+    } else {
+      EXPECT_GT(taken.front().second, 2u);
+      EXPECT_EQ(taken.size(), 2u);
+      EXPECT_THAT(refused, ElementsAre(HasSubstr("none.obj")));
+    }
+  }
+}
+
 TEST(FrameLoop, ReportsTheAgeOfALiveImageFromItsTimestamp) {
   SteppedClock clock;
   const Timestamp taken = clock.Now() - std::chrono::milliseconds(30);
