@@ -69,7 +69,7 @@ std::vector<std::uint32_t> MeshReader::ReadTriangles(const tinygltf::Primitive& 
 }
 
 void MeshReader::ReadVertices(const Attributes& attributes, std::span<const std::uint32_t> chosen,
-                              Primitive* result) {
+                              const std::string& place, Primitive* result) {
   result->vertices.resize(chosen.size());
   const auto read = [&](const char* name, const auto& assign) {
     const auto found = attributes.find(name);
@@ -99,19 +99,28 @@ void MeshReader::ReadVertices(const Attributes& attributes, std::span<const std:
         has_alpha ? ReadVector<4>(reader, element) : glm::vec4(ReadVector<3>(reader, element), 1);
     vertex->color = glm::clamp(color, 0.0f, 1.0f);
   });
-  ReadSkinning(attributes, chosen, result);
+  ReadSkinning(attributes, chosen, place, result);
 }
 
 void MeshReader::ReadSkinning(const Attributes& attributes, std::span<const std::uint32_t> chosen,
-                              Primitive* result) {
-  const std::vector<JointSet> sets = JointSets(attributes);
+                              const std::string& place, Primitive* result) {
+  // More than two sets are rare, and any number of them may name the same two accessors.
+  constexpr std::uint64_t kMaxSetsPerVertex = 8;
+  struct Readers {
+    const AccessorReader& joints;
+    const AccessorReader& weights;
+  };
+  std::vector<Readers> sets;
+  for (const JointSet& set : JointSets(attributes))
+    sets.push_back({accessors_.Get(set.joints), accessors_.Get(set.weights)});
   if (sets.empty()) return;
+  joint_reads_ += std::uint64_t{chosen.size()} * sets.size();
+  if (joint_reads_ > kMaxSetsPerVertex * limits_.max_vertices)
+    Refuse(file_, place, "has too many sets of joints for its vertices.");
   std::vector<std::pair<float, std::uint32_t>> influences;  // Weight and joint.
   for (std::size_t i = 0; i < chosen.size(); ++i) {
     influences.clear();
-    for (const JointSet& set : sets) {
-      const AccessorReader& joints = accessors_.Get(set.joints);
-      const AccessorReader& weights = accessors_.Get(set.weights);
+    for (const auto& [joints, weights] : sets) {
       for (int k = 0; k < 4; ++k) {
         const float weight = weights.Float(chosen[i], k);
         if (weight > 0) influences.emplace_back(weight, joints.Unsigned(chosen[i], k));
@@ -153,7 +162,7 @@ Primitive MeshReader::ReadPrimitive(const tinygltf::Primitive& primitive, const 
     return static_cast<std::uint32_t>(std::lower_bound(chosen.begin(), chosen.end(), vertex) -
                                       chosen.begin());
   });
-  ReadVertices(primitive.attributes, chosen, &result);
+  ReadVertices(primitive.attributes, chosen, place, &result);
   if (has_normals) {
     RepairNormals(&result);
   } else {

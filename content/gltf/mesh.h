@@ -37,8 +37,10 @@ class MeshReader {
   // Triangles as indices of the file's vertices, three each.
   std::vector<std::uint32_t> ReadTriangles(const tinygltf::Primitive& primitive, std::size_t vertex_count,
                                            const std::string& place);
-  void ReadVertices(const Attributes& attributes, std::span<const std::uint32_t> chosen, Primitive* result);
-  void ReadSkinning(const Attributes& attributes, std::span<const std::uint32_t> chosen, Primitive* result);
+  void ReadVertices(const Attributes& attributes, std::span<const std::uint32_t> chosen,
+                    const std::string& place, Primitive* result);
+  void ReadSkinning(const Attributes& attributes, std::span<const std::uint32_t> chosen,
+                    const std::string& place, Primitive* result);
   Primitive ReadPrimitive(const tinygltf::Primitive& primitive, const std::string& place);
   void Warn(const std::string& sentence);
 
@@ -49,6 +51,7 @@ class MeshReader {
   AccessorCache& accessors_;
   std::vector<std::string>& warnings_;
   std::uint64_t vertices_ = 0, indices_ = 0;  // Totals of all primitives so far.
+  std::uint64_t joint_reads_ = 0;             // The same: the sets of joints of each vertex.
 };
 
 }  // namespace docent::content

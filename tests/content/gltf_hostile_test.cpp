@@ -266,5 +266,20 @@ TEST(HostileGltf, SkinsMustHaveTheJointsThatVerticesUse) {
   EXPECT_EQ(file.Refusal(), "") << "joint 9 has no weight and does not count";
 }
 
+TEST(HostileGltf, ManySetsOfJointsOnTheSameAccessorsAreRefused) {
+  GltfFile file = TriangleFile();
+  const int joints = file.AddAccessor<std::uint8_t>(std::vector<std::uint8_t>(12, 0), 5121, "VEC4", 3);
+  const int weights = file.AddFloats(std::vector<float>(12, 0.25f), "VEC4", 3);
+  nlohmann::json& attributes = file.json["meshes"][0]["primitives"][0]["attributes"];
+  for (int i = 0; i < 2'000; ++i) {
+    attributes["JOINTS_" + std::to_string(i)] = joints;
+    attributes["WEIGHTS_" + std::to_string(i)] = weights;
+  }
+  EXPECT_EQ(file.Refusal(), "") << "the whole file is small";
+  LoadLimits limits;
+  limits.max_vertices = 100;
+  EXPECT_THAT(file.Refusal(limits), HasSubstr("meshes[0].primitives[0] has too many sets of joints"));
+}
+
 }  // namespace
 }  // namespace docent::content
