@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 
 namespace docent::content {
 namespace {
@@ -144,11 +145,17 @@ class MaterialReader {
   }
 
   // The mean of the texture's texels in linear light (alpha unchanged); white without a texture. Each image
-  // is averaged once; a regular sample of at most 64x64 texels is sufficient for a mean.
-  glm::vec4 MeanColor(const TextureUse& use) const {
+  // is averaged once, because very many materials may show it.
+  glm::vec4 MeanColor(const TextureUse& use) {
     if (use.texture < 0) return glm::vec4(1);
-    const Image& image =
-        images_[static_cast<std::size_t>(textures_[static_cast<std::size_t>(use.texture)].image)];
+    const int index = textures_[static_cast<std::size_t>(use.texture)].image;
+    const auto [entry, is_new] = mean_colors_.try_emplace(index);
+    if (is_new) entry->second = MeanOf(images_[static_cast<std::size_t>(index)]);
+    return entry->second;
+  }
+
+  // A regular sample of at most 64x64 texels is sufficient for a mean.
+  static glm::vec4 MeanOf(const Image& image) {
     glm::dvec4 sum(0);
     const int steps_x = std::min(64, image.width_px), steps_y = std::min(64, image.height_px);
     for (int y = 0; y < steps_y; ++y) {
@@ -174,6 +181,7 @@ class MaterialReader {
   const std::vector<Texture>& textures_;
   const std::vector<Image>& images_;
   std::vector<std::string>& warnings_;
+  std::map<int, glm::vec4> mean_colors_;  // Of the images for which they were needed so far.
 };
 
 }  // namespace

@@ -9,6 +9,7 @@
 #include "content/asset.h"
 #include "content/gltf/check.h"
 #include "content/gltf/images.h"
+#include "content/gltf/material.h"
 #include "content/gltf/resources.h"
 #include "tests/app/support/temporary_folder.h"
 #include "tests/content/make_gltf.h"
@@ -220,6 +221,24 @@ TEST(HostileGltf, ManyExtensionsAreNotSearchedForEachOfManyPrimitives) {
   const double begin_s = ProcessorTime_s();
   CheckMeshes("test.glb", root);
   EXPECT_LT(ProcessorTime_s() - begin_s, 5);
+}
+
+TEST(HostileGltf, AnImageIsAveragedOnceForManyMaterials) {
+  const std::vector<Image> images = {{64, 64, std::vector<std::uint8_t>(std::size_t{64} * 64 * 4, 128)}};
+  Texture texture;
+  texture.image = 0;
+  const tinygltf::Value info(tinygltf::Value::Object{{"index", tinygltf::Value(0)}});
+  tinygltf::Material material;
+  material.extensions["KHR_materials_pbrSpecularGlossiness"] =
+      tinygltf::Value(tinygltf::Value::Object{{"diffuseTexture", info}, {"specularGlossinessTexture", info}});
+  tinygltf::Model source;
+  source.materials.assign(40'000, material);
+  std::vector<std::string> warnings;
+  const double begin_s = ProcessorTime_s();
+  const std::vector<Material> materials = ReadMaterials(source, {texture}, images, &warnings);
+  EXPECT_LT(ProcessorTime_s() - begin_s, 3);
+  EXPECT_FLOAT_EQ(materials.front().roughness, 1 - 128.0f / 255);
+  EXPECT_FLOAT_EQ(materials.back().roughness, 1 - 128.0f / 255);
 }
 
 TEST(HostileGltf, UnsupportedRequiredExtensionsAreNamed) {
