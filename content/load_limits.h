@@ -18,6 +18,8 @@ struct LoadLimits {
   std::uint64_t max_indices = 24'000'000;       // Three per triangle, for all primitives after unrolling.
   // The same, counting each mesh once for each node that shows it.
   std::uint64_t max_drawn_indices = 60'000'000;
+  // Primitives, counted in this way too, because each of them is drawn on its own in each frame.
+  std::uint64_t max_drawn_primitives = 200'000;
   std::uint64_t max_key_frame_values = 8'000'000;  // For all animation channels.
   int max_image_side_px = 16384;                   // For the longer side of an image.
   std::uint64_t max_image_pixels = 128ull << 20;   // For all images together.

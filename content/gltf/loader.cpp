@@ -180,11 +180,17 @@ void CheckDrawn(const std::string& name, const Model& model, const LoadLimits& l
       indices[i] += std::max(primitive.indices.size(), primitive.vertices.size());
     }
   }
-  std::uint64_t drawn = 0;
+  std::uint64_t drawn = 0, primitives = 0;
   for (const Node& node : model.nodes) {
-    if (node.mesh >= 0) drawn += indices[static_cast<std::size_t>(node.mesh)];
+    if (node.mesh < 0) continue;
+    const auto mesh = static_cast<std::size_t>(node.mesh);
+    drawn += indices[mesh];
+    primitives += model.meshes[mesh].primitives.size();
     if (drawn > limits.max_drawn_indices) {
       Refuse(name, "nodes", "show more than " + std::to_string(limits.max_drawn_indices / 3) + " triangles.");
+    }
+    if (primitives > limits.max_drawn_primitives) {
+      Refuse(name, "nodes", "show more than " + std::to_string(limits.max_drawn_primitives) + " primitives.");
     }
   }
 }

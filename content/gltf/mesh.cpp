@@ -189,8 +189,9 @@ Mesh MeshReader::Read(std::size_t mesh) {
     } else if (!primitive.attributes.contains("POSITION")) {
       Warn("Primitives without positions are left out.");
     } else {
-      result.primitives.push_back(
-          ReadPrimitive(primitive, Place("meshes", mesh) + "." + Place("primitives", i)));
+      Primitive read = ReadPrimitive(primitive, Place("meshes", mesh) + "." + Place("primitives", i));
+      // Without a whole triangle there is nothing to draw, and each node would go through it in each frame.
+      if (!read.indices.empty()) result.primitives.push_back(std::move(read));
     }
   }
   return result;

@@ -206,6 +206,28 @@ TEST(HostileGltf, SmallFilesThatUnrollToHugeMeshesExceedTheLimits) {
   EXPECT_EQ(file.Refusal(), "");
 }
 
+TEST(HostileGltf, PrimitivesWithoutAWholeTriangleAreLeftOut) {
+  GltfFile file;
+  const int position = file.AddFloats({0, 0, 0}, "VEC3", 1);
+  nlohmann::json primitives = nlohmann::json::array();
+  for (int i = 0; i < 100; ++i) primitives.push_back({{"attributes", {{"POSITION", position}}}});
+  file.Add("meshes", {{"primitives", primitives}});
+  file.Add("nodes", {{"mesh", 0}});
+  const auto model = file.Load();
+  ASSERT_EQ(model->meshes.size(), 1u);
+  EXPECT_TRUE(model->meshes[0].primitives.empty());
+}
+
+TEST(HostileGltf, NodesThatShowVeryManyPrimitivesAreRefused) {
+  GltfFile file = TriangleFile();
+  nlohmann::json& primitives = file.json["meshes"][0]["primitives"];
+  while (primitives.size() < 1'000) primitives.push_back(primitives[0]);
+  EXPECT_EQ(file.Refusal(), "");
+  nlohmann::json& shown = file.json["scenes"][0]["nodes"];
+  while (shown.size() < 1'000) shown.push_back(file.Add("nodes", {{"mesh", 0}}));
+  EXPECT_THAT(file.Refusal(), HasSubstr("nodes show more than 200000 primitives"));
+}
+
 TEST(HostileGltf, ManyExtensionsAreNotSearchedForEachOfManyPrimitives) {
   constexpr int kMany = 60'000;
   nlohmann::json root;
