@@ -198,9 +198,11 @@ ConvertedGltf GltfFromAssimp(const std::filesystem::path& path, const LoadLimits
   // The importer owns the handler.
   importer.SetIOHandler(new FolderOnly(path.parent_path(), limits.max_file_bytes));
   importer.SetPropertyInteger(AI_CONFIG_PP_SBP_REMOVE, aiPrimitiveType_POINT | aiPrimitiveType_LINE);
+  // aiProcess_GlobalScale converts an FBX from its unit, usually centimetres, to metres. It changes no other
+  // format: the importer of Collada applies the unit of the file itself, and the others have none.
   const aiScene* scene = importer.ReadFile(
       path.string(), aiProcess_Triangulate | aiProcess_JoinIdenticalVertices | aiProcess_SortByPType |
-                         aiProcess_FlipUVs | aiProcess_ValidateDataStructure);
+                         aiProcess_FlipUVs | aiProcess_ValidateDataStructure | aiProcess_GlobalScale);
   if (scene == nullptr || scene->mRootNode == nullptr) {
     std::string words = importer.GetErrorString();
     std::replace(words.begin(), words.end(), '\n', ' ');

@@ -11,7 +11,8 @@
 // Reads model files that are not glTF with assimp and converts them to glTF, so that the result passes
 // through the glTF loader's checks like any other file. Triangles, normals, two sets of texture coordinates,
 // vertex colours, the node tree, material colours and PNG or JPEG textures are converted; skins and
-// animations are not.
+// animations are not. The result is in metres where the format tells its unit (FBX and Collada); else a unit
+// of the file counts as a metre.
 namespace docent::content {
 
 // Whether the file's extension is one of .obj, .ply, .stl, .fbx, .dae, .3ds, .off.

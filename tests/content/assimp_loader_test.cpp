@@ -81,6 +81,41 @@ TEST_F(OtherFormats, APlyKeepsItsVertexColours) {
   EXPECT_EQ(asset.model->meshes[0].primitives[0].vertices[0].color, glm::vec4(1, 0, 0, 1));
 }
 
+// A triangle with sides of 100 units of this many centimetres.
+std::string FbxTriangle(const std::string& unit_cm) {
+  return "; FBX 7.4.0 project file\n"
+         "FBXHeaderExtension:  {\n\tFBXHeaderVersion: 1003\n\tFBXVersion: 7400\n}\n"
+         "GlobalSettings:  {\n\tVersion: 1000\n\tProperties70:  {\n"
+         "\t\tP: \"UpAxis\", \"int\", \"Integer\", \"\",1\n"
+         "\t\tP: \"UpAxisSign\", \"int\", \"Integer\", \"\",1\n"
+         "\t\tP: \"FrontAxis\", \"int\", \"Integer\", \"\",2\n"
+         "\t\tP: \"FrontAxisSign\", \"int\", \"Integer\", \"\",1\n"
+         "\t\tP: \"CoordAxis\", \"int\", \"Integer\", \"\",0\n"
+         "\t\tP: \"CoordAxisSign\", \"int\", \"Integer\", \"\",1\n"
+         "\t\tP: \"UnitScaleFactor\", \"double\", \"Number\", \"\"," +
+         unit_cm +
+         "\n\t}\n}\n"
+         "Objects:  {\n"
+         "\tGeometry: 1001, \"Geometry::\", \"Mesh\" {\n"
+         "\t\tVertices: *9 {\n\t\t\ta: 0,0,0,100,0,0,0,100,0\n\t\t}\n"
+         "\t\tPolygonVertexIndex: *3 {\n\t\t\ta: 0,1,-3\n\t\t}\n"
+         "\t\tGeometryVersion: 124\n\t}\n"
+         "\tModel: 1002, \"Model::triangle\", \"Mesh\" {\n"
+         "\t\tVersion: 232\n\t\tProperties70:  {\n"
+         "\t\t\tP: \"Lcl Translation\", \"Lcl Translation\", \"\", \"A\",100,0,0\n\t\t}\n\t}\n"
+         "}\n"
+         "Connections:  {\n\tC: \"OO\",1002,0\n\tC: \"OO\",1001,1002\n}\n";
+}
+
+TEST_F(OtherFormats, AnFbxIsConvertedToMetres) {
+  const Asset in_centimetres = ImportAsset(Write("centimetres.fbx", FbxTriangle("1")));
+  EXPECT_NEAR(in_centimetres.model->bounds_min.x, 1, 1e-5);
+  EXPECT_NEAR(in_centimetres.model->bounds_max.x, 2, 1e-5);
+  EXPECT_NEAR(in_centimetres.model->bounds_max.y, 1, 1e-5);
+  const Asset in_metres = ImportAsset(Write("metres.fbx", FbxTriangle("100")));
+  EXPECT_NEAR(in_metres.model->bounds_max.x, 200, 1e-3);
+}
+
 TEST_F(OtherFormats, DamagedFilesAreRefusedInOneSentence) {
   for (const char* name : {"a.obj", "a.ply", "a.stl", "a.fbx", "a.dae", "a.3ds", "a.off"}) {
     const std::filesystem::path path = Write(name, "this is no model\n");
