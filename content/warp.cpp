@@ -5,6 +5,8 @@
 #include <Eigen/SVD>
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
+#include <utility>
 
 #include "content/mesh_tools.h"
 #include "content/model_bounds.h"
@@ -74,17 +76,35 @@ Eigen::Matrix3d Cofactors(const Eigen::Matrix3d& m) {
   return m.determinant() < 0 ? Eigen::Matrix3d(-cofactors) : cofactors;
 }
 
-Vertex WarpedVertex(const Vertex& vertex, const glm::mat4& model_from_vertex, const Warp& warp) {
-  const RestVertex rest = AtRest(vertex, model_from_vertex);
-  const Eigen::Matrix3d transform = warp.Jacobian(rest.position) * rest.model_from_vertex;
+// `transform`: of directions at the vertex, to the bent model; `position`: in the bent model.
+Vertex WarpedVertex(const Vertex& vertex, const Eigen::Matrix3d& transform, const Eigen::Vector3d& position) {
   Vertex warped = vertex;
-  warped.position = glm::vec3(GlmFromEigen(warp(rest.position)));
+  warped.position = glm::vec3(GlmFromEigen(position));
   warped.normal = UnitOr(GlmFromEigen(Cofactors(transform) * EigenFrom(vertex.normal)), vertex.normal);
   const glm::vec3 tangent(vertex.tangent);
-  warped.tangent = glm::vec4(UnitOr(GlmFromEigen(transform * EigenFrom(tangent)), tangent), vertex.tangent.w);
+  const float handedness = transform.determinant() < 0 ? -vertex.tangent.w : vertex.tangent.w;
+  warped.tangent = glm::vec4(UnitOr(GlmFromEigen(transform * EigenFrom(tangent)), tangent), handedness);
   warped.joints = glm::u16vec4(0);
   warped.weights = glm::vec4(0);
   return warped;
+}
+
+// `joints` and `node`: as for RestMatrix.
+void WarpPrimitive(const std::vector<glm::mat4>& joints, const glm::mat4& node, const Warp& warp,
+                   Primitive* primitive) {
+  std::vector<bool> mirrors;
+  mirrors.reserve(primitive->vertices.size());
+  for (Vertex& vertex : primitive->vertices) {
+    const RestVertex rest = AtRest(vertex, RestMatrix(vertex, joints, node));
+    const Eigen::Matrix3d transform = warp.Jacobian(rest.position) * rest.model_from_vertex;
+    mirrors.push_back(transform.determinant() < 0);
+    vertex = WarpedVertex(vertex, transform, warp(rest.position));
+  }
+  // The order of its corners says which side of a triangle is its front, and a reflection reverses it.
+  std::vector<std::uint32_t>& indices = primitive->indices;
+  for (std::size_t i = 0; i + 2 < indices.size(); i += 3) {
+    if (mirrors[indices[i]]) std::swap(indices[i + 1], indices[i + 2]);
+  }
 }
 
 }  // namespace
@@ -183,10 +203,7 @@ std::shared_ptr<const Model> Warped(const Model& model, const Warp& warp) {
     if (node.mesh < 0) continue;
     const std::vector<glm::mat4>& joints = skins.Of(node);
     Mesh mesh = model.meshes[static_cast<std::size_t>(node.mesh)];
-    for (Primitive& primitive : mesh.primitives) {
-      for (Vertex& vertex : primitive.vertices)
-        vertex = WarpedVertex(vertex, RestMatrix(vertex, joints, nodes[i]), warp);
-    }
+    for (Primitive& primitive : mesh.primitives) WarpPrimitive(joints, nodes[i], warp, &primitive);
     Node flat;
     flat.name = node.name;
     flat.mesh = static_cast<int>(warped->meshes.size());

@@ -43,7 +43,9 @@ std::optional<Eigen::Vector3d> Unwarped(const Warp& warp, const Eigen::Vector3d&
 // What is wrong with a stored warp, as the end of a sentence; empty if nothing is.
 std::string Validate(const Warp& warp);
 
-// The model in its rest pose with every vertex, normal and tangent deformed. It has no animations.
+// The model in its rest pose with every vertex, normal and tangent deformed. It has no animations. Where a
+// node or the warp mirrors, the corners of the triangles are in the opposite order, so that fronts stay
+// fronts.
 std::shared_ptr<const Model> Warped(const Model& model, const Warp& warp);
 
 }  // namespace docent::content

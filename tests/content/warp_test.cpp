@@ -200,6 +200,32 @@ TEST(Warped, VerticesNormalsAndTangentsAreThoseOfTheDeformedSurface) {
   EXPECT_NEAR(along.normalized().dot(Eigen::Vector3d(n.x, n.y, n.z)), 0, 1e-3);
 }
 
+TEST(Warped, TheFrontOfAMirroredPartStaysItsFront) {
+  Warp mirror;
+  mirror.controls = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
+  mirror.weights.assign(4, Eigen::Vector3d::Zero());
+  const Warp straight = mirror;
+  mirror.affine(1, 1) = -1;
+  for (const float scale : {1.0f, -1.0f}) {
+    for (const Warp& warp : {straight, mirror}) {
+      Model model = SquareOnANode();
+      model.nodes[0].scale = {scale, 1, 1};
+      const auto warped = Warped(model, warp);
+      const Primitive& primitive = warped->meshes[0].primitives[0];
+      const bool is_mirrored = (scale < 0) != (warp.affine(1, 1) < 0);
+      ASSERT_EQ(primitive.indices.size(), 6u);
+      for (std::size_t i = 0; i < 6; i += 3) {
+        const Vertex& a = primitive.vertices[primitive.indices[i]];
+        const glm::vec3 b = primitive.vertices[primitive.indices[i + 1]].position,
+                        c = primitive.vertices[primitive.indices[i + 2]].position;
+        EXPECT_GT(glm::dot(glm::cross(b - a.position, c - a.position), a.normal), 0.5f)
+            << scale << " " << warp.affine(1, 1);
+        EXPECT_EQ(a.tangent.w, is_mirrored ? 1.0f : -1.0f) << scale << " " << warp.affine(1, 1);
+      }
+    }
+  }
+}
+
 TEST(BentModels, AShapeIsComputedOnceAndForgottenWhenItIsNotDrawn) {
   auto asset = std::make_shared<Asset>();
   asset->model = std::make_shared<Model>(SquareOnANode());
