@@ -9,6 +9,7 @@
 #include <assimp/Importer.hpp>
 #include <cctype>
 #include <cmath>
+#include <span>
 
 #include "content/assimp_material.h"
 #include "content/gltf/container.h"
@@ -19,6 +20,26 @@ namespace docent::content {
 namespace {
 
 constexpr const char* kFormats[] = {".obj", ".ply", ".stl", ".fbx", ".dae", ".3ds", ".off"};
+
+// Formats whose vertex colours are those of a screen (sRGB), as scanners write them; glTF's are linear.
+constexpr const char* kFormatsWithSrgbColors[] = {".obj", ".ply", ".stl", ".off"};
+
+// The ending of the file's name in lower case, such as ".obj".
+std::string EndingOf(const std::filesystem::path& path) {
+  std::string ending = path.extension().string();
+  std::transform(ending.begin(), ending.end(), ending.begin(),
+                 [](unsigned char letter) { return static_cast<char>(std::tolower(letter)); });
+  return ending;
+}
+
+bool Contains(std::span<const char* const> endings, const std::string& ending) {
+  return std::find(endings.begin(), endings.end(), ending) != endings.end();
+}
+
+// IEC 61966-2-1.
+float LinearFromSrgb(float value) {
+  return value <= 0.04045f ? value / 12.92f : std::pow((value + 0.055f) / 1.055f, 2.4f);
+}
 
 // Restricts assimp to regular files of limited size inside one folder; symbolic links are resolved.
 class FolderOnly : public Assimp::DefaultIOSystem {
@@ -52,6 +73,7 @@ class Writer {
   Writer(const std::string& file, const std::filesystem::path& folder, const aiScene& scene,
          const LoadLimits& limits)
       : file_(file),
+        has_srgb_colors_(Contains(kFormatsWithSrgbColors, EndingOf(file))),
         scene_(scene),
         limits_(limits),
         materials_(folder, scene, limits, &buffer_, &warnings_) {}
@@ -119,7 +141,9 @@ class Writer {
       std::vector<float> colors;
       for (unsigned int i = 0; i < mesh.mNumVertices; ++i) {
         const aiColor4D& color = mesh.mColors[0][i];
-        colors.insert(colors.end(), {color.r, color.g, color.b, color.a});
+        for (const float value : {color.r, color.g, color.b})
+          colors.push_back(has_srgb_colors_ ? LinearFromSrgb(value) : value);
+        colors.push_back(color.a);
       }
       attributes["COLOR_0"] = WriteAccessor(colors, 5126, "VEC4", mesh.mNumVertices);
     }
@@ -174,6 +198,7 @@ class Writer {
   }
 
   const std::string& file_;
+  const bool has_srgb_colors_;
   const aiScene& scene_;
   const LoadLimits& limits_;
   GltfBuilder buffer_;
@@ -185,10 +210,7 @@ class Writer {
 }  // namespace
 
 bool IsAssimpFormat(const std::filesystem::path& path) {
-  std::string extension = path.extension().string();
-  std::transform(extension.begin(), extension.end(), extension.begin(),
-                 [](unsigned char letter) { return static_cast<char>(std::tolower(letter)); });
-  return std::find(std::begin(kFormats), std::end(kFormats), extension) != std::end(kFormats);
+  return Contains(kFormats, EndingOf(path));
 }
 
 ConvertedGltf GltfFromAssimp(const std::filesystem::path& path, const LoadLimits& limits) {

@@ -12,7 +12,7 @@
 // through the glTF loader's checks like any other file. Triangles, normals, two sets of texture coordinates,
 // vertex colours, the node tree, material colours and PNG or JPEG textures are converted; skins and
 // animations are not. The result is in metres where the format tells its unit (FBX and Collada); else a unit
-// of the file counts as a metre.
+// of the file counts as a metre. Vertex colours of OBJ, PLY, STL and OFF are converted from sRGB to linear.
 namespace docent::content {
 
 // Whether the file's extension is one of .obj, .ply, .stl, .fbx, .dae, .3ds, .off.

@@ -81,6 +81,24 @@ TEST_F(OtherFormats, APlyKeepsItsVertexColours) {
   EXPECT_EQ(asset.model->meshes[0].primitives[0].vertices[0].color, glm::vec4(1, 0, 0, 1));
 }
 
+TEST_F(OtherFormats, VertexColoursOfScansAreConvertedFromSrgbToLinear) {
+  const Asset ply =
+      ImportAsset(Write("gray.ply",
+                        "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\n"
+                        "property float z\nproperty uchar red\nproperty uchar green\n"
+                        "property uchar blue\nproperty uchar alpha\nelement face 1\n"
+                        "property list uchar int vertex_indices\nend_header\n"
+                        "0 0 0 128 128 5 128\n1 0 0 128 128 5 128\n0 1 0 128 128 5 128\n3 0 1 2\n"));
+  const glm::vec4 color = ply.model->meshes[0].primitives[0].vertices[0].color;
+  EXPECT_NEAR(color.r, 0.2159f, 1e-4);
+  EXPECT_NEAR(color.g, 0.2159f, 1e-4);
+  EXPECT_NEAR(color.b, 5 / 255.0f / 12.92f, 1e-5);
+  EXPECT_NEAR(color.a, 128 / 255.0f, 1e-5);
+  const Asset obj = ImportAsset(
+      Write("gray.obj", "v 0 0 0 0.5 0.5 0.5\nv 1 0 0 0.5 0.5 0.5\nv 0 1 0 0.5 0.5 0.5\nf 1 2 3\n"));
+  EXPECT_NEAR(obj.model->meshes[0].primitives[0].vertices[0].color.r, 0.2140f, 1e-4);
+}
+
 // A triangle with sides of 100 units of this many centimetres.
 std::string FbxTriangle(const std::string& unit_cm) {
   return "; FBX 7.4.0 project file\n"
