@@ -458,9 +458,9 @@ void AuthorControls::ChooseFile(content::AssetKind kind) {
   const char* const title = is_image   ? ui::strings::kBrowseImageTitle
                             : is_sound ? ui::strings::kBrowseSoundTitle
                                        : ui::strings::kBrowseTitle;
-  const char* const patterns = is_image   ? "*.png *.jpg *.jpeg"
+  const std::string patterns = is_image   ? "*.png *.jpg *.jpeg"
                                : is_sound ? "*.wav *.flac *.ogg *.oga"
-                                          : "*.glb *.gltf *.obj *.ply *.stl *.fbx *.dae";
+                                          : ModelFilePatterns();
   if (dialog_.is_open()) return;
   dialog_kind_ = kind;
   if (!dialog_.Open(title, patterns)) board_.AddError(ui::strings::kNoFileDialog);

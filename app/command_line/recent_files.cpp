@@ -5,13 +5,15 @@
 #include <cctype>
 #include <cstdlib>
 #include <fstream>
-#include <set>
+#include <iterator>
 
 namespace docent::app {
 
 namespace {
 
 constexpr std::size_t kMostRecentFiles = 12;
+constexpr const char* kModelEndings[] = {".glb", ".gltf", ".obj", ".ply", ".stl",
+                                         ".fbx", ".dae",  ".3ds", ".off"};
 
 }  // namespace
 
@@ -51,11 +53,16 @@ void RecentFiles::Add(const std::filesystem::path& file) {
 }
 
 bool IsModelFile(const std::filesystem::path& file) {
-  static const std::set<std::string> kEndings = {".glb", ".gltf", ".obj", ".ply", ".stl", ".fbx", ".dae"};
   std::string ending = file.extension().string();
   std::transform(ending.begin(), ending.end(), ending.begin(),
                  [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
-  return kEndings.contains(ending);
+  return std::find(std::begin(kModelEndings), std::end(kModelEndings), ending) != std::end(kModelEndings);
+}
+
+std::string ModelFilePatterns() {
+  std::string patterns;
+  for (const char* ending : kModelEndings) patterns += (patterns.empty() ? "*" : " *") + std::string(ending);
+  return patterns;
 }
 
 std::vector<std::string> ModelFilesIn(const std::filesystem::path& folder) {

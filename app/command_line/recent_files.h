@@ -28,6 +28,8 @@ class RecentFiles {
 
 // Whether the ending of the file's name is one of a model.
 bool IsModelFile(const std::filesystem::path& file);
+// The endings of models as a file dialog takes them: "*.glb *.gltf" and so on.
+std::string ModelFilePatterns();
 // The model files in a folder, by name; empty when it cannot be read.
 std::vector<std::string> ModelFilesIn(const std::filesystem::path& folder);
 

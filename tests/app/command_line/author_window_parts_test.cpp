@@ -12,12 +12,14 @@
 #include "app/command_line/file_dialog.h"
 #include "app/command_line/recent_files.h"
 #include "app/files/text_file.h"
+#include "content/assimp_loader.h"
 #include "tests/app/support/temporary_folder.h"
 
 namespace docent::app {
 namespace {
 
 using ::testing::ElementsAre;
+using ::testing::HasSubstr;
 using ::testing::IsEmpty;
 
 TEST(RecentFiles, AreRememberedWithTheLastOneFirst) {
@@ -54,6 +56,14 @@ TEST(ModelFiles, AreKnownByTheirEnding) {
   for (const char* name : {"b.glb", "a.OBJ", "notes.txt", "c.stl"}) folder.Write(name, std::string("x"));
   EXPECT_THAT(ModelFilesIn(folder / ""), ElementsAre("a.OBJ", "b.glb", "c.stl"));
   EXPECT_THAT(ModelFilesIn(folder / "nowhere"), IsEmpty());
+}
+
+TEST(ModelFiles, AreAllThatCanBePlaced) {
+  for (const std::string ending : {".glb", ".gltf", ".obj", ".ply", ".stl", ".fbx", ".dae", ".3ds", ".off"}) {
+    EXPECT_TRUE(ending.starts_with(".gl") || content::IsAssimpFormat("model" + ending)) << ending;
+    EXPECT_TRUE(IsModelFile("model" + ending)) << ending;
+    EXPECT_THAT(ModelFilePatterns() + " ", HasSubstr("*" + ending + " "));
+  }
 }
 
 TEST(CommandWords, SayWhatWasDone) {
