@@ -167,8 +167,9 @@ std::vector<int> ReadImages(const std::string& name, const tinygltf::Model& sour
         fault = "is a damaged image";
       }
     }
-    if (fault)
-      model->warnings.push_back(Place("images", i) + " " + *fault + ", and its textures are left out.");
+    // What only an extension shows, such as a WebP image beside its PNG, costs no texture.
+    const char* const loss = used[i] ? ", and its textures are left out." : ", and is left out.";
+    if (fault) model->warnings.push_back(Place("images", i) + " " + *fault + loss);
   }
   return place_of;
 }

@@ -197,9 +197,19 @@ TEST(GltfRepair, AnImageThatCannotBeShownCostsItsTexturesOnly) {
 TEST(GltfRepair, ADamagedImageThatNothingShowsIsNamed) {
   GltfFile file = TriangleFile();
   file.Add("images", {{"uri", kPixelPng.substr(0, kPixelPng.size() - 16)}});
-  EXPECT_THAT(file.Load()->warnings,
-              ElementsAre("images[0] is an image that is cut off, and its textures are "
-                          "left out."));
+  EXPECT_THAT(file.Load()->warnings, ElementsAre("images[0] is an image that is cut off, and is left out."));
+}
+
+TEST(GltfRepair, AWebpImageBesideItsPngCostsNoTexture) {
+  GltfFile file = TexturedTriangle(kPixelPng, kPixelPng);
+  const int webp = file.Add("images", {{"uri", "data:image/webp;base64,UklGRg=="}});
+  file.json["textures"][0]["extensions"]["EXT_texture_webp"]["source"] = webp;
+  file.json["extensionsUsed"] = {"EXT_texture_webp"};
+  const auto model = file.Load();
+  EXPECT_THAT(model->warnings, ElementsAre(HasSubstr("EXT_texture_webp is not supported"),
+                                           "images[2] is neither a PNG nor a JPEG image, and is left out."));
+  EXPECT_EQ(model->materials[0].base_color_texture.texture, 0);
+  EXPECT_EQ(model->images.size(), 2u);
 }
 
 TEST(GltfRepair, ExtensionsThatAreLeftOutAreNamedOnce) {
