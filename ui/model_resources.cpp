@@ -87,9 +87,16 @@ ModelResources::ModelResources(const content::Model& model, int max_texture_px)
 
 GLuint ModelResources::Texture(const content::Model& model, int texture, bool is_color) {
   if (texture < 0 || texture >= static_cast<int>(model.textures.size())) return 0;
-  const auto found = textures_.find({texture, is_color});
-  if (found != textures_.end()) return found->second.name();
   const content::Texture& description = model.textures[texture];
+  const TextureKey key = {description.image,
+                          description.repeat_u,
+                          description.repeat_v,
+                          description.mirror_u,
+                          description.mirror_v,
+                          description.nearest,
+                          is_color};
+  const auto found = textures_.find(key);
+  if (found != textures_.end()) return found->second.name();
   if (description.image < 0 || description.image >= static_cast<int>(model.images.size())) return 0;
   const content::Image& image = model.images[description.image];
   const std::size_t bytes = std::size_t{4} * image.width_px * image.height_px;
@@ -113,7 +120,7 @@ GLuint ModelResources::Texture(const content::Model& model, int texture, bool is
     glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_MIN_FILTER, GL_NEAREST_MIPMAP_LINEAR);
     glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_MAG_FILTER, GL_NEAREST);
   }
-  return textures_.emplace(std::make_pair(texture, is_color), std::move(uploaded)).first->second.name();
+  return textures_.emplace(key, std::move(uploaded)).first->second.name();
 }
 
 ModelResources& ModelCache::Get(const std::shared_ptr<const content::Model>& model) {

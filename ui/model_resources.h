@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <compare>
 #include <cstddef>
 #include <glm/glm.hpp>
 #include <map>
 #include <memory>
 #include <optional>
 #include <unordered_map>
-#include <utility>
 #include <vector>
 
 #include "content/model.h"
@@ -48,13 +48,22 @@ class ModelResources {
   ModelResources(const content::Model& model, int max_texture_px);
 
   const std::vector<GpuPrimitive>& primitives(int mesh) const { return meshes_[mesh]; }
-  // Returns 0 when the model has no such texture. Colour textures are sRGB, the others linear.
+  // Returns 0 when the model has no such texture. Colour textures are sRGB, the others linear. Textures that
+  // show one image in the same way share their memory.
   GLuint Texture(const content::Model& model, int texture, bool is_color);
 
  private:
+  // An image and how it is sampled. Files often have a texture of their own for each material that uses an
+  // image, so the index of the texture would upload the image several times.
+  struct TextureKey {
+    int image;
+    bool repeat_u, repeat_v, mirror_u, mirror_v, nearest, is_color;
+    auto operator<=>(const TextureKey&) const = default;
+  };
+
   int max_texture_px_;
   std::vector<std::vector<GpuPrimitive>> meshes_;
-  std::map<std::pair<int, bool>, GlTexture> textures_;
+  std::map<TextureKey, GlTexture> textures_;
 };
 
 // The resources of all models in use. Sweep frees those of models that no longer exist.

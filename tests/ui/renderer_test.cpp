@@ -9,6 +9,7 @@
 #include "ui/content_layer.h"
 #include "ui/gl_objects.h"
 #include "ui/inset.h"
+#include "ui/model_resources.h"
 
 namespace docent::ui {
 namespace {
@@ -205,6 +206,24 @@ TEST_F(RendererTest, FreesGraphicsMemoryOfDeletedModels) {
   layer.Draw(camera, {}, scene, {}, target);
   layer.Draw(camera, {}, scene, {}, target);
   EXPECT_EQ(layer.cached_models(), 1u);
+}
+
+TEST_F(RendererTest, UploadsAnImageOnceForAllTexturesThatShowItInTheSameWay) {
+  content::Model model;
+  content::Image image;
+  image.width_px = image.height_px = 1;
+  image.rgba = {255, 255, 255, 255};
+  model.images.push_back(image);
+  content::Texture texture;
+  texture.image = 0;
+  model.textures.assign(3, texture);
+  model.textures[2].repeat_u = false;
+  ModelResources resources(model, 256);
+  const GLuint color = resources.Texture(model, 0, true);
+  ASSERT_NE(color, 0u);
+  EXPECT_EQ(resources.Texture(model, 1, true), color);
+  EXPECT_NE(resources.Texture(model, 2, true), color) << "it is sampled in another way";
+  EXPECT_NE(resources.Texture(model, 0, false), color) << "it is not decoded as a colour";
 }
 
 TEST_F(RendererTest, AnimatesTheSearchFigureWhileLost) {
