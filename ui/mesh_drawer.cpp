@@ -253,7 +253,9 @@ void MeshDrawer::DepthRange::Include(double depth, double radius) {
 }
 
 double MeshDrawer::DepthRange::near_plane() const {
-  return std::max(nearest * 0.99, far_plane() / kMaxDepthRatio);
+  // Surfaces of the room that are nearer are drawn at this plane. It is before all content by more than they
+  // have to be to hide it (kDepthBias of the content layer).
+  return std::max(nearest * 0.97, far_plane() / kMaxDepthRatio);
 }
 
 glm::mat4 MeshDrawer::DepthRange::ClipFromMap(const PinholeView& view) const {

@@ -86,6 +86,8 @@ TEST_F(SurfaceDrawerTest, ShowsContentThatStandsOnASurface) {
 
 TEST_F(SurfaceDrawerTest, HidesContentBehindASurfaceAtTheCamera) {
   EXPECT_EQ(Green(Draw(50, Screen(-9, 9, 0.01F))), 0);
+  ASSERT_GT(Green(Draw(100, nullptr)), 0);
+  EXPECT_EQ(Green(Draw(100, Screen(-9, 9, 0.01F))), 0) << "content of little extent in depth";
 }
 
 TEST_F(SurfaceDrawerTest, PutsEdgesWhereTheLensShowsThem) {
