@@ -21,6 +21,7 @@ constexpr glm::vec3 kFloorRadiance(0.2f, 0.18f, 0.16f);
 constexpr double kMaxDepthRatio = 20000.0;
 // For all skins in view together. Skins beyond this limit keep their bind pose.
 constexpr int kMaxJoints = 16384;
+constexpr int kNotAdded = -2;  // Of a skin of the instance, instead of its first joint.
 
 const content::Material& DefaultMaterial() {
   static const content::Material kMaterial;
@@ -154,6 +155,7 @@ void MeshDrawer::AddInstance(const ModelInstance& instance) {
   const std::vector<glm::mat4> nodes = content::NodeMatrices(model, animation, instance.seconds);
   std::vector<int> open(model.roots.begin(), model.roots.end());
   const std::size_t first_item = items_.size();
+  first_joints_.assign(model.skins.size(), kNotAdded);
   while (!open.empty()) {
     const int node = open.back();
     open.pop_back();
@@ -177,7 +179,7 @@ void MeshDrawer::AddNode(const ModelInstance& instance, const std::vector<glm::m
   const content::Model& model = *instance.model;
   const content::Node& node = model.nodes[node_index];
   ModelResources& resources = cache_.Get(instance.model);
-  const int first_joint = node.skin >= 0 ? AddJoints(instance, nodes, node.skin) : -1;
+  const int first_joint = node.skin >= 0 ? FirstJoint(instance, nodes, node.skin) : -1;
   for (const GpuPrimitive& primitive : resources.primitives(node.mesh)) {
     if (primitive.index_count == 0) continue;
     Item item;
@@ -191,7 +193,8 @@ void MeshDrawer::AddNode(const ModelInstance& instance, const std::vector<glm::m
     item.map_from_mesh = skinned ? instance.map_from_model : instance.map_from_model * nodes[node_index];
     Box box;
     if (skinned) {
-      const std::size_t joint_count = std::min(primitive.joint_boxes.size(), joints_.size() - first_joint);
+      const std::size_t joint_count =
+          std::min(primitive.joint_boxes.size(), model.skins[node.skin].joints.size());
       for (std::size_t i = 0; i < joint_count; ++i)
         Extend(primitive.joint_boxes[i], item.map_from_mesh * joints_[first_joint + i], &box);
     } else {
@@ -204,6 +207,13 @@ void MeshDrawer::AddNode(const ModelInstance& instance, const std::vector<glm::m
     if (std::isfinite(item.radius) && std::isfinite(glm::dot(item.center, item.center)))
       items_.push_back(std::move(item));
   }
+}
+
+int MeshDrawer::FirstJoint(const ModelInstance& instance, const std::vector<glm::mat4>& nodes,
+                           int skin_index) {
+  int& first = first_joints_[skin_index];
+  if (first == kNotAdded) first = AddJoints(instance, nodes, skin_index);
+  return first;
 }
 
 int MeshDrawer::AddJoints(const ModelInstance& instance, const std::vector<glm::mat4>& nodes,

@@ -115,6 +115,9 @@ class MeshDrawer {
 
   void AddInstance(const ModelInstance& instance);
   void AddNode(const ModelInstance& instance, const std::vector<glm::mat4>& nodes, int node_index);
+  // The index in joints_ of the first joint of a skin of the instance that is being added; all its meshes
+  // with that skin share them. -1 where there is no room for them.
+  int FirstJoint(const ModelInstance& instance, const std::vector<glm::mat4>& nodes, int skin_index);
   int AddJoints(const ModelInstance& instance, const std::vector<glm::mat4>& nodes, int skin_index);
   void SetScene(const PinholeView& view, const glm::mat4& clip_from_map, const ModelLight& light);
   void SetLight(const ModelLight& light);
@@ -128,6 +131,7 @@ class MeshDrawer {
   GlBuffer joint_buffer_;
   GlTexture joint_texture_;
   std::vector<glm::mat4> joints_;
+  std::vector<int> first_joints_;  // Of the instance that is being added, by skin; see FirstJoint.
   std::vector<Item> items_;
   std::vector<Caster> casters_;  // Of the prepared instances.
   std::vector<CasterPose> still_poses_, moving_poses_;

@@ -172,9 +172,8 @@ TEST_F(RendererTest, DrawsNoContentWithoutAPose) {
   EXPECT_EQ(CountDifferent(DrawImage(&renderer, tracked, camera, scene), tracked.frame.image), 0);
 }
 
-TEST_F(RendererTest, MovesASkinnedMeshWithItsJoint) {
-  Renderer renderer;
-  const engine::CameraModel camera = StronglyDistorted();
+// A square with a joint that moves it by 0.3 to the right.
+std::shared_ptr<content::Model> SquareOnAJoint() {
   auto model = SquareModel(0.05f, glm::vec4(1));
   for (content::Vertex& vertex : model->meshes[0].primitives[0].vertices)
     vertex.weights = glm::vec4(1, 0, 0, 0);
@@ -184,13 +183,37 @@ TEST_F(RendererTest, MovesASkinnedMeshWithItsJoint) {
   model->roots.push_back(1);
   model->skins.push_back({{1}, {glm::mat4(1.0f)}});
   model->nodes[0].skin = 0;
-  content::Entity entity = Facing(model, {0, 0, 2});
+  return model;
+}
+
+// Two metres before the camera, with the axes of the map.
+cv::Mat DrawnBefore(const engine::CameraModel& camera, std::shared_ptr<const content::Model> model) {
+  Renderer renderer;
+  content::Entity entity = Facing(std::move(model), {0, 0, 2});
   entity.model.map_from_model.rotation = {};
   content::Scene scene;
   scene.entities.push_back(entity);
-  const cv::Mat drawn = DrawImage(&renderer, Tracked(cv::Mat::zeros(480, 640, CV_8UC3)), camera, scene);
+  return DrawImage(&renderer, Tracked(cv::Mat::zeros(480, 640, CV_8UC3)), camera, scene);
+}
+
+TEST_F(RendererTest, MovesASkinnedMeshWithItsJoint) {
+  const engine::CameraModel camera = StronglyDistorted();
   const Eigen::Vector2d expected = *camera.Project(Eigen::Vector3d(0.3, 0, 2));
-  EXPECT_LT((Centroid(drawn) - expected).norm(), 0.5);
+  EXPECT_LT((Centroid(DrawnBefore(camera, SquareOnAJoint())) - expected).norm(), 0.5);
+}
+
+TEST_F(RendererTest, MovesManyMeshesOfOneSkinWithTheirJoint) {
+  const engine::CameraModel camera = StronglyDistorted();
+  auto model = SquareOnAJoint();
+  model->skins[0].joints.resize(60, 1);
+  model->skins[0].inverse_bind.resize(60, glm::mat4(1.0f));
+  for (int i = 1; i < 300; ++i) {
+    model->roots.push_back(static_cast<int>(model->nodes.size()));
+    model->nodes.push_back(model->nodes[0]);
+  }
+  // A square whose joints found no room would be in the middle of the image.
+  const Eigen::Vector2d expected = *camera.Project(Eigen::Vector3d(0.3, 0, 2));
+  EXPECT_LT((Centroid(DrawnBefore(camera, model)) - expected).norm(), 0.5);
 }
 
 TEST_F(RendererTest, FreesGraphicsMemoryOfDeletedModels) {
