@@ -125,6 +125,25 @@ std::vector<CardTarget> MovedToBoards(std::vector<CardTarget> targets, std::span
   return targets;
 }
 
+std::vector<LabelArea> AreasOfLabels(const content::Scene& scene, const LabelView& view,
+                                     std::span<const DrawnBoard> boards) {
+  std::vector<LabelArea> areas;
+  const Eigen::Vector3d eye = view.camera_from_map.OriginInSource();
+  for (const content::Entity& entity : scene.entities) {
+    if (entity.kind != content::Entity::Kind::kLabel || !IsLabelFar(entity.label, eye)) continue;
+    if (entity.hidden && std::find(view.faint.begin(), view.faint.end(), entity.name) == view.faint.end())
+      continue;
+    if (const auto dot = TargetOfLabel(entity.label, {}, view.camera, view.camera_from_map))
+      areas.push_back({entity.name, {dot->low, dot->high}});
+  }
+  for (const DrawnBoard& drawn : boards) {
+    areas.push_back({drawn.entity,
+                     {view.image_in_canvas.ImageFromWindow(drawn.board.min()),
+                      view.image_in_canvas.ImageFromWindow(drawn.board.max())}});
+  }
+  return areas;
+}
+
 const CardTarget* TargetAt(const std::vector<CardTarget>& targets, const Eigen::Vector2d& pixel,
                            double margin_px) {
   const CardTarget* best = nullptr;

@@ -24,6 +24,11 @@ std::vector<CardTarget> FindCardTargets(const content::Scene& scene, const engin
 std::vector<CardTarget> MovedToBoards(std::vector<CardTarget> targets, std::span<const DrawnBoard> boards,
                                       const Letterbox& box);
 
+// Where the labels of a scene are in the image as they were drawn, in the order in which DrawLabels draws
+// them: first the dots of those that are far away, then the boards that it returned.
+std::vector<LabelArea> AreasOfLabels(const content::Scene& scene, const LabelView& view,
+                                     std::span<const DrawnBoard> boards);
+
 // The target that a person means by this pixel of the image, who may miss it by `margin_px`: of those that
 // contain it the smallest, else the nearest. Null for none.
 const CardTarget* TargetAt(const std::vector<CardTarget>& targets, const Eigen::Vector2d& pixel,

@@ -69,6 +69,7 @@ struct Renderer::Impl {
   // Draws labels and heads-up display into a canvas that shows the image in this part of it.
   void DrawTexts(const View& view, const HeadsUpStyle& style, const Letterbox& box, Canvas* target) {
     card_targets.clear();
+    label_areas.clear();
     const bool has_card = view.overlay.visitor && view.overlay.visitor->card;
     const double lowest = target->height_px() - 12 * style.unit_px - style.bottom_px;
     const Eigen::AlignedBox2d caption =
@@ -83,8 +84,9 @@ struct Renderer::Impl {
       if (!caption.isEmpty() && !has_card) taken.push_back(caption);
       // An image that is small in its window makes texts small that a visitor is to read.
       const double least_px = view.overlay.visitor ? kNormalTextUnits * style.unit_px : 0;
-      boards =
-          DrawLabels(*view.scene, {*view.camera, *from, box, language, view.faint, taken, least_px}, target);
+      const LabelView labels{*view.camera, *from, box, language, view.faint, taken, least_px};
+      boards = DrawLabels(*view.scene, labels, target);
+      if (!view.overlay.visitor) label_areas = AreasOfLabels(*view.scene, labels, boards);
     }
     if (view.overlay.visitor) card_targets = MovedToBoards(view.overlay.visitor->targets, boards, box);
     if (has_card) return DrawCardWithTexts(view, style, target);
@@ -169,6 +171,7 @@ struct Renderer::Impl {
   ImageTarget inset_image;
   std::unique_ptr<ContentLayer> inset_content;  // Made for the first inset with content.
   std::vector<CardTarget> card_targets;
+  std::vector<LabelArea> label_areas;
   CardModel card_model;
   GLuint card_texture = 0;
   VideoExposure exposure;
@@ -269,6 +272,10 @@ void Renderer::PresentWithHeadsUp(const View& view, const WindowPart& part, cons
 
 const std::vector<CardTarget>& Renderer::card_targets() const {
   return impl_->card_targets;
+}
+
+const std::vector<LabelArea>& Renderer::label_areas() const {
+  return impl_->label_areas;
 }
 
 void Renderer::ReadBack(cv::Mat* image) {

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <Eigen/Geometry>
 #include <map>
 #include <memory>
 #include <opencv2/core/mat.hpp>
@@ -29,6 +30,13 @@ struct CardTarget {
   std::string entity;                              // Its name.
   Eigen::Vector2d low = Eigen::Vector2d::Zero();   // The rectangle of the camera's image that it covers,
   Eigen::Vector2d high = Eigen::Vector2d::Zero();  // in pixels.
+};
+
+// Where a label is drawn, for an author who points at it: its board, or a square about its dot where it
+// is far away.
+struct LabelArea {
+  std::string entity;        // Its name.
+  Eigen::AlignedBox2d area;  // Pixels of the camera's image.
 };
 
 // What a visitor has opened; it is drawn over everything but the sentences at the bottom.
@@ -187,6 +195,9 @@ class Renderer {
   // What had a card in the heads-up display that was drawn last, with the boards of labels where they were
   // drawn. Valid until the next one is drawn.
   const std::vector<CardTarget>& card_targets() const;
+  // The labels of the heads-up display that was drawn last, in the order in which they were drawn; none for a
+  // visitor. The reference stays valid, and what it refers to changes when the next one is drawn.
+  const std::vector<LabelArea>& label_areas() const;
   // Reads back the last drawn image as CV_8UC3 (BGR). *image's memory is reused if it fits.
   void ReadBack(cv::Mat* image);
   // The same with the view's heads-up display, which the drawn image shall not have. The drawn image is not

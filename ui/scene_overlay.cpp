@@ -100,6 +100,17 @@ GizmoLines SceneOverlay::EdgesOf(const PlacedBox& placed, Eigen::AlignedBox2d* s
 void SceneOverlay::DrawOutline(const PlacedBox& placed, const std::string& name, bool is_locked) {
   Eigen::AlignedBox2d seen;
   const GizmoLines lines = EdgesOf(placed, &seen);
+  DrawNamed(lines, seen, name, is_locked);
+}
+
+void SceneOverlay::DrawOutline(const Eigen::AlignedBox2d& area, const std::string& name, bool is_locked) {
+  const Eigen::Vector2d low = area.min(), high = area.max();
+  DrawNamed({{low, {high.x(), low.y()}, high, {low.x(), high.y()}, low}},
+            {box_.WindowFromImage(low), box_.WindowFromImage(high)}, name, is_locked);
+}
+
+void SceneOverlay::DrawNamed(const GizmoLines& lines, const Eigen::AlignedBox2d& seen,
+                             const std::string& name, bool is_locked) {
   // A dark line below the bright one is seen on any image.
   DrawLines(lines, {0, 0, 0, 0.55f}, 3.5);
   DrawLines(lines, is_locked ? theme::kMutedText : theme::kSelection, 1.5);

@@ -24,6 +24,8 @@ class SceneOverlay {
 
   // The edges of an entity's box, and its name above it.
   void DrawOutline(const PlacedBox& placed, const std::string& name, bool is_locked);
+  // The edges of a part of the image, in its pixels, where an entity is drawn that has no box, and its name.
+  void DrawOutline(const Eigen::AlignedBox2d& area, const std::string& name, bool is_locked);
   // The edges of the box within which the map is extended, in map coordinates.
   void DrawBoundary(const Eigen::AlignedBox3d& bounds);
   // A point of the map that belongs at another one, with its number.
@@ -39,6 +41,9 @@ class SceneOverlay {
   // The edges of a box as far as the lens sees them. `seen`, if not null, is extended by the visible part, in
   // pixels of the window.
   GizmoLines EdgesOf(const PlacedBox& placed, Eigen::AlignedBox2d* seen) const;
+  // Lines with a name above them. `seen`: what they cover, in pixels of the window.
+  void DrawNamed(const GizmoLines& lines, const Eigen::AlignedBox2d& seen, const std::string& name,
+                 bool is_locked);
   void DrawLines(const GizmoLines& lines, const Color& color, double width);
 
   const GizmoCamera& camera_;

@@ -3,11 +3,13 @@
 
 #include <memory>
 #include <optional>
+#include <vector>
 
 #include "app/session/guided_view.h"
 #include "content/picking.h"
 #include "ui/gizmo.h"
 #include "ui/letterbox.h"
+#include "ui/renderer.h"
 #include "ui/window_layout.h"
 
 namespace docent::app {
@@ -22,6 +24,8 @@ struct AuthorView {
   ui::Area image;                               // The part of the window that the image is centred in.
   ui::Area inset;                               // Of the second camera's image; empty without one.
   double scale = 1;                             // Of the interface.
+  // The labels in the image that was drawn last, the topmost last; null where none are drawn.
+  const std::vector<ui::LabelArea>* labels = nullptr;
 
   bool has_pose() const { return frame && engine::HasPose(frame->tracked.state) && frame->tracked.map; }
   // Whether the image shows this point of the window, and not the second camera's image.

@@ -246,6 +246,7 @@ class GuideWindow {
     view.frame = large();
     view.image = layout.image;
     view.scale = layout.scale;
+    view.labels = &renderer_.label_areas();
     view.camera.lens = camera();
     view.box = ui::FitImage(camera().width_px(), camera().height_px(), layout.image);
     if (!large()) return view;

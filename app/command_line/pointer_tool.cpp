@@ -21,6 +21,26 @@ Eigen::Vector3d OriginOf(const content::Entity& entity, const ui::PlacedBox& box
   return stands ? box.Base() : content::PlaceOf(entity);
 }
 
+// The uppermost label that is drawn at this pixel and not hidden; null for none.
+const content::Entity* LabelAt(const AuthorView& view, const Eigen::Vector2d& pixel) {
+  if (view.labels == nullptr) return nullptr;
+  for (auto label = view.labels->rbegin(); label != view.labels->rend(); ++label) {
+    if (!label->area.contains(pixel)) continue;
+    const content::Entity* const entity = view.scene->Find(label->entity);
+    if (entity != nullptr && !entity->hidden) return entity;
+  }
+  return nullptr;
+}
+
+// Where the label is drawn, if it is.
+void DrawLabelOutline(const AuthorView& view, const std::string& name, bool is_muted,
+                      ui::SceneOverlay* overlay) {
+  if (view.labels == nullptr) return;
+  for (const ui::LabelArea& label : *view.labels) {
+    if (label.entity == name) overlay->DrawOutline(label.area, name, is_muted);
+  }
+}
+
 }  // namespace
 
 engine::Rotation3 UprightRotation(const content::Scene& scene, const engine::MapSnapshot& map) {
@@ -48,10 +68,15 @@ std::optional<ui::Gizmo> PointerTool::SelectedGizmo(const AuthorView& view, cons
 }
 
 const content::Entity* PointerTool::EntityAt(const AuthorView& view, const Eigen::Vector2d& pixel) {
+  if (!view.scene) return nullptr;
+  if (const content::Entity* const label = LabelAt(view, pixel)) return label;
   const auto ray = view.RayAt(pixel);
-  if (!ray || !view.scene) return nullptr;
+  if (!ray) return nullptr;
   content::Scene shown = *view.scene;
-  std::erase_if(shown.entities, [](const content::Entity& entity) { return entity.hidden; });
+  // The boards of labels are not where their shapes are: they are moved apart, and left out from afar.
+  std::erase_if(shown.entities, [](const content::Entity& entity) {
+    return entity.hidden || entity.kind == content::Entity::Kind::kLabel;
+  });
   const auto pick = content::PickEntity(*ray, shown, shapes_->PickOptionsAt(view.frame->seconds));
   return pick ? view.scene->Find(shown.entities[pick->entity].name) : nullptr;
 }
@@ -143,8 +168,12 @@ void PointerTool::Draw(const AuthorView& view, const content::Scene& preview, co
   for (const std::string& name : selection_->names()) {
     const content::Entity* const entity = preview.Find(name);
     if (entity == nullptr) continue;
-    if (const auto box = shapes_->BoxOf(*entity, view.eye()))
-      overlay->DrawOutline(*box, name, entity->locked || entity->hidden);
+    const bool is_muted = entity->locked || entity->hidden;
+    if (entity->kind == content::Entity::Kind::kLabel) {
+      DrawLabelOutline(view, name, is_muted, overlay);
+    } else if (const auto box = shapes_->BoxOf(*entity, view.eye())) {
+      overlay->DrawOutline(*box, name, is_muted);
+    }
   }
   const auto gizmo = SelectedGizmo(view, preview);
   if (!gizmo || (drag_ && drag_->motion.part() == ui::GizmoPart::kGround && is_dragging())) return;

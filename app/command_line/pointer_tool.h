@@ -58,7 +58,7 @@ class PointerTool {
   // The handles of the selected entity; empty unless exactly one is selected that may be changed.
   std::optional<ui::Gizmo> SelectedGizmo(const AuthorView& view, const content::Scene& scene);
   void Hold(const AuthorView& view, const ui::Gizmo& gizmo, ui::GizmoPart part, const Eigen::Vector2d& point);
-  // The entity at this pixel; null for none.
+  // The entity at this pixel; null for none. Labels are drawn over everything else.
   const content::Entity* EntityAt(const AuthorView& view, const Eigen::Vector2d& pixel);
 
   ui::Selection* const selection_;

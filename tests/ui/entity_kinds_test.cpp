@@ -184,6 +184,32 @@ TEST_F(EntityKindsImage, ALabelIsDrawnWithItsLeaderLine) {
   EXPECT_LT(faint_brightness, 0.6 * brightness(320, 320));
 }
 
+TEST_F(EntityKindsImage, TheAreasOfLabelsAreWhereTheyAreDrawn) {
+  Renderer renderer;
+  content::Scene scene;
+  scene.entities = {LabelAt({0, 0.4, 2}, {0, -0.5, 0}), LabelAt({0, 0.4, 2}, {0, -0.5, 0}),
+                    LabelAt({10, 0, 40}, {0, 0, 0})};
+  for (std::size_t i = 0; i < 3; ++i) scene.entities[i].name = "label-" + std::to_string(i + 1);
+  const cv::Mat image = Drawn(&renderer, scene, true, false);
+  const std::vector<LabelArea>& areas = renderer.label_areas();
+  ASSERT_EQ(areas.size(), 3u);
+  EXPECT_EQ(areas[0].entity, "label-3");
+  EXPECT_LT((areas[0].area.center() - Eigen::Vector2d(319.5 + 400 * 0.25, 239.5)).norm(), 1e-6)
+      << "the dot of a label that is too far away to be read";
+  EXPECT_LT(areas[0].area.sizes().maxCoeff(), 30);
+  EXPECT_EQ(areas[1].entity, "label-1");
+  EXPECT_EQ(areas[2].entity, "label-2");
+  EXPECT_FALSE(areas[1].area.intersects(areas[2].area));
+  for (const LabelArea& label : areas) {
+    const Eigen::Vector2i low = label.area.min().array().ceil().matrix().cast<int>();
+    const Eigen::Vector2i size = label.area.max().array().floor().matrix().cast<int>() - low;
+    EXPECT_GT(LitPixels(image(cv::Rect(low.x(), low.y(), size.x(), size.y()))), 10) << label.entity;
+  }
+  scene.entities[2].hidden = true;
+  Drawn(&renderer, scene, true, false);
+  EXPECT_EQ(renderer.label_areas().size(), 2u);
+}
+
 TEST_F(EntityKindsImage, ALabelHasTheResolutionOfTheTextsOverTheImage) {
   Renderer renderer;
   content::Scene scene;

@@ -73,6 +73,41 @@ TEST_F(PointerAtBoxes, SeveralAreDraggedTogetherAndStaySelected) {
   EXPECT_THAT(selection_.names(), ElementsAre("left", "right"));
 }
 
+TEST_F(PointerAtBoxes, AClickSelectsTheLabelThatIsDrawnThere) {
+  content::Scene scene = *view_.scene;
+  for (const char* name : {"first", "second", "far"}) {
+    content::Entity label;
+    label.name = name;
+    label.kind = content::Entity::Kind::kLabel;
+    label.label.text = "Lion";
+    label.label.anchor = {0, -0.5, 5};
+    label.label.text_height = 0.2;
+    scene.entities.push_back(label);
+  }
+  view_.scene = std::make_shared<const content::Scene>(scene);
+  // The boards of the first two are moved apart.
+  const auto rows = [](double top, double bottom) {
+    return Eigen::AlignedBox2d(Eigen::Vector2d(300, top), Eigen::Vector2d(340, bottom));
+  };
+  const std::vector<ui::LabelArea> labels = {
+      {"far", rows(182, 198)}, {"first", rows(100, 120)}, {"second", rows(118, 138)}};
+  view_.labels = &labels;
+  const auto press = [&](double y) {
+    selection_.Clear();
+    tool_.Press(view_, {320, y}, false);
+    tool_.Release();
+    return selection_.names();
+  };
+  EXPECT_THAT(press(110), ElementsAre("first"));
+  EXPECT_THAT(press(130), ElementsAre("second"));
+  EXPECT_THAT(press(119.5), ElementsAre("second")) << "it is drawn over the first one";
+  EXPECT_THAT(press(190), ElementsAre("far"));
+  EXPECT_THAT(press(175), ElementsAre()) << "where boards would be that are not drawn there";
+  scene.entities.back().hidden = true;
+  view_.scene = std::make_shared<const content::Scene>(scene);
+  EXPECT_THAT(press(190), ElementsAre());
+}
+
 TEST_F(PointerAtBoxes, StepsAddUpUntilTheSceneShowsThem) {
   selection_.Set({"left"});
   const double step = 0.01 * Eigen::Vector3d(-1, -0.5, 5).norm();
