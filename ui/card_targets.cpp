@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "content/cards.h"
+#include "content/picking.h"
 #include "ui/label_layout.h"
 
 namespace docent::ui {
@@ -17,17 +18,52 @@ namespace {
 
 constexpr double kLeastSize = std::numbers::pi / 180;  // Radians; smaller things are not pointed at.
 
+// What the lens sees of a box that reaches beyond what it sees, as beside a person who stands at it: points
+// of its edges, and the points of the image, in a coarse grid, that show its sides. Empty if it sees none.
+Eigen::AlignedBox2d SeenOf(const PlacedBox& box, const engine::CameraModel& camera,
+                           const engine::Rigid3& camera_from_map) {
+  constexpr int kSteps = 32;  // Along an edge.
+  Eigen::AlignedBox2d seen;
+  for (int corner = 0; corner < 8; ++corner) {
+    for (const int bit : {1, 2, 4}) {
+      if ((corner & bit) != 0) continue;
+      const Eigen::Vector3d from = camera_from_map * box.Corner(corner),
+                            to = camera_from_map * box.Corner(corner | bit);
+      for (int i = 0; i <= kSteps; ++i) {
+        const double t = static_cast<double>(i) / kSteps;
+        if (const auto pixel = camera.Project(Eigen::Vector3d((1 - t) * from + t * to))) seen.extend(*pixel);
+      }
+    }
+  }
+  const engine::Sim3 box_from_map = box.map_from_box.inverse();
+  const engine::Rotation3 map_from_camera = camera_from_map.rotation.inverse();
+  const Eigen::Vector3d eye = box_from_map * camera_from_map.OriginInSource();
+  for (const double right : {0.0, 0.5, 1.0}) {
+    for (const double down : {0.0, 0.5, 1.0}) {
+      const Eigen::Vector2d pixel(right * (camera.width_px() - 1), down * (camera.height_px() - 1));
+      const auto ray = camera.Unproject(pixel);
+      if (!ray) continue;
+      const Eigen::Vector3d direction = box_from_map.rotation * (map_from_camera * *ray);
+      if (content::IntersectBox({eye, direction}, box.low, box.high)) seen.extend(pixel);
+    }
+  }
+  return seen;
+}
+
 // The part of the image that a box covers; empty if it is behind the camera, outside the image, or too small.
 std::optional<CardTarget> TargetOf(const PlacedBox& box, const engine::CameraModel& camera,
                                    const engine::Rigid3& camera_from_map) {
-  const double infinite = std::numeric_limits<double>::infinity();
-  CardTarget target{{}, Eigen::Vector2d::Constant(infinite), Eigen::Vector2d::Constant(-infinite)};
+  Eigen::AlignedBox2d seen;
   for (int corner = 0; corner < 8; ++corner) {
     const auto pixel = camera.Project(camera_from_map * box.Corner(corner));
-    if (!pixel) return std::nullopt;
-    target.low = target.low.cwiseMin(*pixel);
-    target.high = target.high.cwiseMax(*pixel);
+    if (!pixel) {
+      seen = SeenOf(box, camera, camera_from_map);
+      break;
+    }
+    seen.extend(*pixel);
   }
+  if (seen.isEmpty()) return std::nullopt;
+  CardTarget target{{}, seen.min(), seen.max()};
   const Eigen::Vector2d last(camera.width_px() - 1, camera.height_px() - 1);
   target.low = target.low.cwiseMax(0.0).cwiseMin(last);
   target.high = target.high.cwiseMax(0.0).cwiseMin(last);

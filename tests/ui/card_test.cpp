@@ -49,6 +49,44 @@ TEST(CardTargets, CoverWhatIsSeenAndComeNearestToTheMiddleFirst) {
   EXPECT_LT((targets[0].high - Eigen::Vector2d(369.5, 289.5)).norm(), 1e-4);
 }
 
+// A model with these bounds in the axes of the map.
+content::Entity WithBounds(const Eigen::Vector3d& low, const Eigen::Vector3d& high) {
+  auto model = SquareModel(1, {1, 1, 1, 1});
+  model->bounds_min = glm::vec3(low.x(), low.y(), low.z());
+  model->bounds_max = glm::vec3(high.x(), high.y(), high.z());
+  content::Entity entity = Facing(model, {0, 0, 1});
+  entity.name = "large";
+  entity.model.map_from_model = {};
+  return entity;
+}
+
+TEST(CardTargets, WhatReachesBeyondTheViewIsOpenedWhereItIsSeen) {
+  const auto targets = [](const content::Entity& entity, const engine::CameraModel& camera) {
+    content::Scene scene;
+    scene.entities.push_back(entity);
+    EntityShapes shapes;
+    return FindCardTargets(scene, camera, {}, &shapes);
+  };
+  const Eigen::Vector2d first(0, 0), last(639, 479);
+  const auto beside = targets(WithBounds({0.5, -0.5, -1}, {1.5, 0.5, 3}), kTargetCamera);
+  ASSERT_EQ(beside.size(), 1u);
+  EXPECT_NEAR(beside[0].low.x(), 319.5 + 500 * 0.5 / 3, 1e-3) << "its farthest edge";
+  EXPECT_EQ(beside[0].high, last);
+  EXPECT_TRUE(targets(WithBounds({0.5, -0.5, -3}, {1.5, 0.5, 0.1}), kTargetCamera).empty())
+      << "it is outside the image";
+  const auto around = targets(WithBounds({-1, -1, -1}, {1, 1, 1}), kTargetCamera);
+  ASSERT_EQ(around.size(), 1u);
+  EXPECT_EQ(around[0].low, first);
+  EXPECT_EQ(around[0].high, last);
+  // This lens is one-to-one up to 46 degrees, and sees no edge of the wall.
+  const engine::CameraModel narrow(engine::LensModel::kRadialTangential, {640, 480, 500, 500, 319.5, 239.5},
+                                   {-0.3, 0, 0, 0, 0});
+  const auto wall = targets(WithBounds({-20, -20, 1}, {20, 20, 1.2}), narrow);
+  ASSERT_EQ(wall.size(), 1u);
+  EXPECT_EQ(wall[0].low, first);
+  EXPECT_EQ(wall[0].high, last);
+}
+
 // A label whose board stands this far above what it is about.
 content::Entity LabelAbove(const Eigen::Vector3d& anchor, double height) {
   content::Entity entity;
