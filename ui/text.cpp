@@ -4,6 +4,7 @@
 #include <pango/pangocairo.h>
 
 #include <algorithm>
+#include <cstddef>
 #include <memory>
 
 namespace docent::ui {
@@ -43,20 +44,41 @@ bool RunsFromRight(gunichar letter) {
          (letter >= 0x1e800 && letter <= 0x1efff);
 }
 
-// Pango takes the direction of a line from its first letter. A text from right to left that begins with a
-// name in Latin letters would have its full stops at the wrong end.
-std::string WithDirection(const std::string& text) {
-  constexpr const char* kRightToLeftMark = "\u200f";
-  int from_left = 0, from_right = 0;
-  for (const char* at = text.c_str(); *at != '\0'; at = g_utf8_next_char(at)) {
+struct Letters {
+  int from_left = 0, from_right = 0;  // By the direction in which they run.
+};
+
+Letters CountLetters(std::string_view text) {
+  Letters letters;
+  const char* const end = text.data() + text.size();
+  for (const char* at = text.data(); at < end; at = g_utf8_next_char(at)) {
     const gunichar character = g_utf8_get_char(at);
-    if (g_unichar_isalpha(character)) ++(RunsFromRight(character) ? from_right : from_left);
+    if (g_unichar_isalpha(character)) ++(RunsFromRight(character) ? letters.from_right : letters.from_left);
   }
-  if (from_right <= from_left) return text;
-  std::string marked = kRightToLeftMark;
-  for (const char character : text) {
-    marked += character;
-    if (character == '\n') marked += kRightToLeftMark;
+  return letters;
+}
+
+// The mark that gives a line the direction of most of its letters; empty where its first letter does so.
+const char* DirectionMark(const Letters& letters) {
+  if (letters.from_right > letters.from_left) return "\u200f";
+  return letters.from_right > 0 && letters.from_right < letters.from_left ? "\u200e" : "";
+}
+
+// Pango takes the direction of a line from its first letter. A line from right to left that begins with a
+// name in Latin letters would have its full stop at the wrong end. Lines without letters run as the text.
+std::string WithDirection(const std::string& text) {
+  const Letters all = CountLetters(text);
+  if (all.from_right == 0) return text;
+  std::string marked;
+  for (std::size_t begin = 0; begin <= text.size();) {
+    const std::size_t end = std::min(text.find('\n', begin), text.size());
+    const std::string_view line = std::string_view(text).substr(begin, end - begin);
+    const Letters letters = CountLetters(line);
+    const bool has_letters = letters.from_left + letters.from_right > 0;
+    if (begin > 0) marked += '\n';
+    marked += DirectionMark(has_letters ? letters : all);
+    marked += line;
+    begin = end + 1;
   }
   return marked;
 }

@@ -30,7 +30,8 @@ std::string ReadableText(std::string_view text, std::size_t max_bytes = 4096);
 
 // Renders text with Pango to a CV_8UC4 image (BGRA, premultiplied alpha) that is as large as the text, at
 // least 1x1 and at most max_width_px by max_height_px. The text is passed through ReadableText first.
-// Its lines begin at the right if most of its letters run from right to left, whatever it begins with.
+// A line begins at the right if most of its letters run from right to left, whatever it begins with; one
+// without letters, if most of those of the text do.
 // *is_cut, if not null, is set to whether part of the text was left out.
 cv::Mat DrawText(std::string_view text, const TextStyle& style, bool* is_cut = nullptr);
 

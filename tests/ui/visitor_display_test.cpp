@@ -203,6 +203,28 @@ TEST(TextDirection, IsThatOfMostOfItsLetters) {
   const std::string english = "The word \u0641\u064a\u0644 means elephant.";
   EXPECT_TRUE(looks_equal(arabic, "\u200f" + arabic));
   EXPECT_TRUE(looks_equal(english, "\u200e" + english));
+  const std::string english_after_name = "\u05d3\u05d5\u05d3 wrote most of these songs.";
+  EXPECT_TRUE(looks_equal(english_after_name, "\u200e" + english_after_name));
+}
+
+TEST(TextDirection, IsThatOfEachLine) {
+  // The darkness of the columns from the first one with a letter to the last one.
+  const auto columns = [](const cv::Mat& image) {
+    cv::Mat alpha, sums;
+    cv::extractChannel(image, alpha, 3);
+    const cv::Rect letters = cv::boundingRect(alpha);
+    cv::reduce(alpha(letters), sums, 0, cv::REDUCE_SUM, CV_32F);
+    return sums;
+  };
+  const std::string arabic =
+      "\u0627\u0644\u0641\u064a\u0644 \u0627\u0644\u0623\u0641\u0631\u064a\u0642\u064a.";
+  const cv::Mat alone = DrawText("The hall.", {}), both = DrawText(arabic + "\nThe hall.", {});
+  // The Arabic line begins at the right of the block, the English one at its left.
+  ASSERT_GT(both.cols, 4 * alone.cols);
+  const cv::Mat expected = columns(alone), drawn = columns(both.colRange(0, both.cols / 2));
+  ASSERT_EQ(drawn.size(), expected.size());
+  EXPECT_LT(cv::norm(drawn, expected, cv::NORM_L1), 0.05 * cv::norm(expected, cv::NORM_L1))
+      << "its full stop is at its right end";
 }
 
 class WayOnOfVisitors : public OffscreenTest {};
