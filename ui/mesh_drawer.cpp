@@ -6,6 +6,7 @@
 #include <cmath>
 #include <cstdint>
 #include <numbers>
+#include <utility>
 
 #include "ui/shaders.h"
 
@@ -192,14 +193,22 @@ void MeshDrawer::AddNode(const ModelInstance& instance, const std::vector<glm::m
     // glTF 2.0 §3.7.3.3: a skinned mesh's own node does not move it.
     item.map_from_mesh = skinned ? instance.map_from_model : instance.map_from_model * nodes[node_index];
     Box box;
+    glm::mat4 map_from_vertex = item.map_from_mesh;
     if (skinned) {
       const std::size_t joint_count =
           std::min(primitive.joint_boxes.size(), model.skins[node.skin].joints.size());
-      for (std::size_t i = 0; i < joint_count; ++i)
-        Extend(primitive.joint_boxes[i], item.map_from_mesh * joints_[first_joint + i], &box);
+      bool is_first = true;
+      for (std::size_t i = 0; i < joint_count; ++i) {
+        if (primitive.joint_boxes[i].empty()) continue;
+        const glm::mat4 map_from_bind = item.map_from_mesh * joints_[first_joint + i];
+        // A mirrored root mirrors all joints, so the first one that moves vertices tells.
+        if (std::exchange(is_first, false)) map_from_vertex = map_from_bind;
+        Extend(primitive.joint_boxes[i], map_from_bind, &box);
+      }
     } else {
       Extend(primitive.box, item.map_from_mesh, &box);
     }
+    item.mirrors = glm::determinant(glm::mat3(map_from_vertex)) < 0.0f;
     item.box = box;
     item.center = 0.5f * (box.low + box.high);
     item.radius = 0.5f * glm::length(box.high - box.low);
@@ -388,12 +397,11 @@ void MeshDrawer::SetScene(const PinholeView& view, const glm::mat4& clip_from_ma
 }
 
 void MeshDrawer::DrawItem(const Item& item) {
-  const bool mirrors = glm::determinant(glm::mat3(item.map_from_mesh)) < 0.0f;
   SetMaterial(item);
   glUniformMatrix4fv(program_.Uniform("map_from_mesh"), 1, GL_FALSE, &item.map_from_mesh[0][0]);
   glUniform1i(program_.Uniform("first_joint"), item.first_joint);
-  glUniform1i(program_.Uniform("flip_normals"), mirrors);
-  glFrontFace(mirrors ? GL_CW : GL_CCW);
+  glUniform1i(program_.Uniform("flip_normals"), item.mirrors);
+  glFrontFace(item.mirrors ? GL_CW : GL_CCW);
   glBindVertexArray(item.primitive->vertex_array.name());
   const auto draw = [&] {
     glDrawElements(GL_TRIANGLES, item.primitive->index_count, GL_UNSIGNED_INT, nullptr);

@@ -107,6 +107,7 @@ class MeshDrawer {
     const content::Material* material = nullptr;
     glm::mat4 map_from_mesh{1.0f};
     int first_joint = -1;
+    bool mirrors = false;    // Whether the vertices are placed by a reflection.
     Box box;                 // In the map.
     glm::vec3 center{0.0f};  // Centre of the box's bounding sphere.
     float radius = 0;

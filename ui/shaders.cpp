@@ -59,7 +59,7 @@ uniform mat4 clip_from_map;
 uniform mat4 map_from_mesh;    // For a skinned mesh this is map_from_model.
 uniform samplerBuffer joint_columns;  // Four texels per joint: model_from_bind.
 uniform int first_joint;       // -1 if the mesh is not skinned.
-uniform bool flip_normals;     // True if map_from_mesh is a reflection.
+uniform bool flip_normals;     // True if vertices are placed by a reflection.
 out vec3 position_in_map;
 out vec3 normal_in_map;
 out vec4 tangent_in_map;

@@ -202,6 +202,20 @@ TEST_F(RendererTest, MovesASkinnedMeshWithItsJoint) {
   EXPECT_LT((Centroid(DrawnBefore(camera, SquareOnAJoint())) - expected).norm(), 0.5);
 }
 
+TEST_F(RendererTest, DrawsTheFrontOfASkinnedMeshThatItsJointMirrors) {
+  const engine::CameraModel camera = StronglyDistorted();
+  auto model = SquareOnAJoint();
+  model->materials[0].double_sided = false;
+  const auto brightest = [&] { return cv::norm(DrawnBefore(camera, model), cv::NORM_INF); };
+  const glm::quat half_turn(0, 0, 1, 0);  // About y, so that the front faces the camera.
+  model->nodes[1].rotation = half_turn;
+  EXPECT_GT(brightest(), 100);
+  model->nodes[1].scale = glm::vec3(-1, 1, 1);
+  EXPECT_GT(brightest(), 100) << "the joint mirrors it";
+  model->nodes[1].rotation = glm::quat(1, 0, 0, 0);
+  EXPECT_EQ(brightest(), 0) << "the back";
+}
+
 TEST_F(RendererTest, MovesManyMeshesOfOneSkinWithTheirJoint) {
   const engine::CameraModel camera = StronglyDistorted();
   auto model = SquareOnAJoint();
