@@ -148,6 +148,11 @@ ivec2 AtlasTexel(ivec2 pixel) {
   return ivec2(texelFetch(lookup, pixel, 0).rg * vec2(textureSize(atlas, 0)));
 }
 
+// Whether the lens has a ray for the pixel; only then it has a place in the atlas.
+bool HasRay(ivec2 pixel) {
+  return texelFetch(lookup, pixel, 0).r >= 0.0;
+}
+
 float Hides(ivec2 pixel, float content) {
   float depth = texelFetch(surface_depth, AtlasTexel(pixel), 0).r;
   return depth < 1.0 && Distance(depth) * (1.0 + depth_bias) < content ? 1.0 : 0.0;
@@ -173,7 +178,8 @@ float Hidden(ivec2 pixel, ivec2 texel) {
   for (int i = 0; i < 16 && !is_edge; ++i) {
     ivec2 step = ivec2[8](ivec2(1, 0), ivec2(0, 1), ivec2(-1, 0), ivec2(0, -1), ivec2(1, 1), ivec2(-1, 1),
                           ivec2(-1, -1), ivec2(1, -1))[i % 8] * (i < 8 ? kRadius : kRadius / 2);
-    is_edge = Hides(clamp(pixel + step, ivec2(0), last), content) != middle;
+    ivec2 other = clamp(pixel + step, ivec2(0), last);
+    is_edge = HasRay(other) && Hides(other, content) != middle;
   }
   if (!is_edge) return middle;
   vec3 own = Video(pixel);
@@ -181,6 +187,7 @@ float Hidden(ivec2 pixel, ivec2 texel) {
   for (int y = -kRadius; y <= kRadius; y += kStep) {
     for (int x = -kRadius; x <= kRadius; x += kStep) {
       ivec2 other = clamp(pixel + ivec2(x, y), ivec2(0), last);
+      if (!HasRay(other)) continue;
       vec3 difference = Video(other) - own;
       float weight = exp(-kSpace * float(x * x + y * y) - kLikeness * dot(difference, difference));
       hidden += weight * Hides(other, content);

@@ -146,6 +146,16 @@ TEST_F(SurfaceDrawerTest, WorksInEveryFaceOfAFisheyeLens) {
   EXPECT_EQ(Green(Draw(0.3, Screen(-9, 9, 0.2F), camera)), 0);
 }
 
+TEST_F(SurfaceDrawerTest, ShowsContentAtTheRimOfALensThatDoesNotFillTheImage) {
+  // This lens is one-to-one up to 46 degrees, which are seen 281 pixels from the middle.
+  const engine::CameraModel camera(engine::LensModel::kRadialTangential, {640, 480, 400, 400, 319.5, 239.5},
+                                   {-0.3, 0, 0, 0, 0});
+  const cv::Mat alone = Draw(0.45, nullptr, camera);
+  ASSERT_GT(alone.at<cv::Vec3b>(240, 319 - 278)[1], 127) << "the square must reach the rim";
+  EXPECT_EQ(cv::norm(alone, Draw(0.45, Screen(-9, 9, 3), camera), cv::NORM_INF), 0)
+      << "the surface is behind";
+}
+
 TEST_F(SurfaceDrawerTest, OccludersHideWhatIsBehindThemUnlessTheyAreSwitchedOff) {
   const int all = Green(Draw(2, nullptr));
   occluders_ = {PlacedScreen(-9, 0, 1.95)};
