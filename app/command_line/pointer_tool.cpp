@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "app/command_line/pointer_tool.h"
 
+#include <algorithm>
 #include <utility>
 
 #include "app/session/map_axes.h"
@@ -195,10 +196,16 @@ void PointerTool::Nudge(const AuthorView& view, int right, int away) {
   level_right.normalize();
   const Eigen::Vector3d level_away = up.cross(level_right);
   if (std::exchange(nudged_in_, view.scene) != view.scene) nudged_.clear();
-  std::vector<ui::NewPose> poses;
-  for (const std::string& name : selection_->names()) {
+  // Locked entities stay, unless nothing else is selected: then the refusal says why nothing moves.
+  const std::vector<std::string>& names = selection_->names();
+  const bool moves_any = std::any_of(names.begin(), names.end(), [&view](const std::string& name) {
     const content::Entity* const entity = view.scene->Find(name);
-    if (entity == nullptr) continue;
+    return entity != nullptr && !entity->locked;
+  });
+  std::vector<ui::NewPose> poses;
+  for (const std::string& name : names) {
+    const content::Entity* const entity = view.scene->Find(name);
+    if (entity == nullptr || (entity->locked && moves_any)) continue;
     const double step = kShareOfDistance * (content::PlaceOf(*entity) - view.eye()).norm();
     const Eigen::Vector3d offset = step * (right * level_right + away * level_away);
     engine::Sim3& pose = nudged_.try_emplace(name, ui::TransformOf(*entity, view.eye())).first->second;

@@ -41,7 +41,8 @@ class PointerTool {
             ui::SceneOverlay* overlay);
 
   // Moves what is selected along the ground as seen from the camera, by a hundredth of its distance: to the
-  // right and away from the viewer by these steps. Steps before the scene shows the last one add up.
+  // right and away from the viewer by these steps. Steps before the scene shows the last one add up. Locked
+  // entities stay if others are selected with them.
   void Nudge(const AuthorView& view, int right, int away);
   // A change was refused, which may have been that of a step.
   void ForgetSteps() { nudged_.clear(); }

@@ -124,5 +124,19 @@ TEST_F(PointerAtBoxes, StepsAddUpUntilTheSceneShowsThem) {
   EXPECT_NEAR(actions_.poses[0].map_from_entity.translation.x(), -1 + step, 1e-9);
 }
 
+TEST_F(PointerAtBoxes, StepsLeaveOutWhatIsLocked) {
+  content::Scene scene = *view_.scene;
+  scene.entities[1].locked = true;
+  view_.scene = std::make_shared<const content::Scene>(std::move(scene));
+  selection_.Set({"left", "right"});
+  tool_.Nudge(view_, 1, 0);
+  ASSERT_EQ(actions_.poses.size(), 1u);
+  EXPECT_EQ(actions_.poses[0].name, "left");
+  selection_.Set({"right"});
+  tool_.Nudge(view_, 1, 0);
+  ASSERT_EQ(actions_.poses.size(), 1u);
+  EXPECT_EQ(actions_.poses[0].name, "right") << "the refusal says that it is locked";
+}
+
 }  // namespace
 }  // namespace docent::app
