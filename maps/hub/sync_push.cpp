@@ -170,7 +170,8 @@ void PushWithPatience(SyncSession* session, std::uint64_t key) {
   }
 }
 
-void PushRemovals(SyncSession* session) {
+// may_remove: see PushTours.
+void PushRemovals(SyncSession* session, bool may_remove) {
   const std::vector<MapLink> links = session->links();
   for (const MapLink& link : links) {
     const HubHead* head = session->HeadOf(link.id);
@@ -181,6 +182,9 @@ void PushRemovals(SyncSession* session) {
     if (!session->options().remove) {
       session->Say(QuotedName(head->name) +
                    " was removed here and is still on the hub; with --removed it is removed there too");
+    } else if (!may_remove) {
+      session->SayProblem(QuotedName(head->name) +
+                          " was removed here and stays on the hub until every change is saved there");
     } else if (head->revision != link.revision) {
       session->SayProblem(QuotedName(head->name) +
                           " was removed here and changed on the hub, where it stays");
@@ -221,8 +225,10 @@ SyncReport Push(const SyncOptions& options) {
     for (const std::string& name : options.maps) session.local().library().FindByName(name);
   }
   for (const std::uint64_t key : keys) PushWithPatience(&session, key);
-  PushRemovals(&session);
-  if (options.maps.empty()) PushTours(&session);
+  // A map that was not saved may hold what was joined into it from one that was removed here.
+  const bool all_saved = session.report().problems == 0;
+  PushRemovals(&session, all_saved);
+  if (options.maps.empty()) PushTours(&session, all_saved);
   return session.report();
 }
 

@@ -121,8 +121,9 @@ bool IsSame(const LocalMap& mine, const HubRevision& theirs);
 // its link.
 MapLink SplitOff(SyncSession* session, const MapLink& link);
 
-// The tours of both sides, after the maps.
-void PushTours(SyncSession* session);
+// The tours of both sides, after the maps. If not `may_remove`, because a map could not be saved on the hub,
+// nothing is removed there, and no tour loses a stop at a map that therefore stays.
+void PushTours(SyncSession* session, bool may_remove);
 void PullTours(SyncSession* session);
 
 }  // namespace docent::maps

@@ -83,8 +83,18 @@ std::string MoveAside(SyncSession* session, const std::string& name, const std::
   return other;
 }
 
+// Whether a tour of the hub stops at a map that was removed here and is still on the hub.
+bool HasStopToRemove(const SyncSession& session, const HubTour& tour) {
+  return std::any_of(tour.stops.begin(), tour.stops.end(), [&](const std::string& stop) {
+    const MapLink* link = session.LinkTo(stop);
+    const HubHead* head = session.HeadOf(stop);
+    return link != nullptr && link->revision > 0 && session.local().StampOf(link->key).empty() &&
+           head != nullptr && !head->removed;
+  });
+}
+
 void PushTour(SyncSession* session, const Tour& tour, const std::vector<HubTour>& theirs,
-              const TourLink* link) {
+              const TourLink* link, bool may_remove) {
   std::optional<HubTour> mine = ForHub(*session, tour);
   if (!mine) {
     session->SayProblem("The tour '" + tour.name +
@@ -94,6 +104,12 @@ void PushTour(SyncSession* session, const Tour& tour, const std::vector<HubTour>
   const HubTour* on_hub = TourNamed(theirs, tour.name);
   const std::string content = ContentOf(*mine);
   if (link != nullptr && link->content == content) return;
+  if (session->options().remove && !may_remove && on_hub != nullptr && !on_hub->removed &&
+      HasStopToRemove(*session, *on_hub)) {
+    session->SayProblem("The tour '" + tour.name +
+                        "' stays on the hub as it is there until every map is saved there");
+    return;
+  }
   std::int64_t base = on_hub == nullptr ? 0 : on_hub->revision;
   if (on_hub != nullptr && !on_hub->removed && ContentOf(*on_hub) != content) {
     if (link == nullptr || link->revision != base) {
@@ -144,13 +160,13 @@ void PullTour(SyncSession* session, const HubTour& theirs, const std::vector<Tou
 
 }  // namespace
 
-void PushTours(SyncSession* session) {
+void PushTours(SyncSession* session, bool may_remove) {
   const std::vector<HubTour> theirs = session->hub().Tours();
   const std::vector<TourLink> links = TourLinks(session, theirs);
   const std::vector<Tour> tours = LocalTours(session);
   for (const Tour& tour : tours) {
     try {
-      PushTour(session, tour, theirs, TourNamed(links, tour.name));
+      PushTour(session, tour, theirs, TourNamed(links, tour.name), may_remove);
     } catch (const HubUnreachable&) {
       throw;
     } catch (const Error& error) {
@@ -162,6 +178,11 @@ void PushTours(SyncSession* session) {
     if (TourNamed(tours, link.name) != nullptr || on_hub == nullptr || on_hub->removed ||
         !session->options().remove || on_hub->revision != link.revision)
       continue;
+    if (!may_remove) {
+      session->SayProblem("The tour '" + link.name +
+                          "' was removed here and stays on the hub until every map is saved there");
+      continue;
+    }
     HubTour removed = *on_hub;
     removed.removed = true;
     session->hub().SaveTour(removed, on_hub->revision);

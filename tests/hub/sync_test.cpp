@@ -204,6 +204,43 @@ TEST_F(HubSync, AMapIsRemovedOnBothSidesOnlyIfThatIsAskedFor) {
   EXPECT_EQ(NamesIn(Open("b")), "");
 }
 
+TEST_F(HubSync, AMapThatWasJoinedStaysOnTheHubUntilTheJoinedMapIsSaved) {
+  {
+    Library a = Open("a");
+    const std::uint64_t desk = AddSampleMap(&a, "Desk", 1, Policy::kBounded);
+    const std::uint64_t shelf = AddSampleMap(&a, "Shelf", 2);
+    a.ChangeTours([&](std::vector<Tour>* tours) { tours->push_back({"All", {desk, shelf}, "", 20}); });
+  }
+  PushFrom("a");
+  {
+    Library a = Open("a");
+    const StoredMap desk = a.Load(a.FindByName("Desk").key);
+    const auto joined = std::make_shared<engine::MapSnapshot>(*desk.snapshot);
+    AddSampleKeyFrame(51, {9, 0, 0}, joined.get());
+    ++joined->revision;
+    ASSERT_TRUE(desk.info.bounds);
+    Bounds bounds = *desk.info.bounds;
+    bounds.max.x() += 10;
+    ASSERT_TRUE(a.Join(
+        {desk.info, a.FindByName("Shelf"), joined, std::make_shared<const SceneRecord>(desk.scene), bounds}));
+  }
+  SyncOptions options = SampleSync(Url(), folder_ / "a");
+  options.remove = true;
+  const SyncReport refused = Push(options);
+  EXPECT_GT(refused.problems, 0);
+  EXPECT_THAT(LinesOf(refused), HasSubstr("'Shelf' was removed here and stays on the hub"));
+  for (const HubHead& head : Hub(Url()).Heads()) EXPECT_FALSE(head.removed) << head.name;
+  EXPECT_EQ(Hub(Url()).Tours().at(0).stops.size(), 2u);
+  {
+    Library a = Open("a");
+    a.SetPolicy(a.FindByName("Desk").key, Policy::kOpen);
+  }
+  EXPECT_EQ(Push(options).problems, 0) << "an administrator may do that";
+  PullTo("b");
+  EXPECT_EQ(NamesIn(Open("b")), "Desk");
+  EXPECT_EQ(Open("b").Tours().at(0).stops.size(), 1u);
+}
+
 TEST_F(HubSync, ARevertedMapIsBroughtBackEverywhere) {
   const std::uint64_t on_b = ShareMap("Desk");
   {
