@@ -94,6 +94,9 @@ void MergeHere(SyncSession* session, const MapInfo& info, const MapLink& link, c
   agreed.scene = their_scene;
   agreed.scene_hash = HashOf("");
   agreed.name = theirs.facts.info.name;
+  // A map that was renamed here is not named as on the hub until that is pushed.
+  if (map.facts.info.name != agreed.name)
+    agreed.local_name = link.local_name.empty() ? agreed.name : link.local_name;
   agreed.policy = ToString(theirs.facts.info.policy);
   session->PutLink(agreed);
   session->Say(QuotedName(info.name) +

@@ -139,6 +139,24 @@ TEST_F(HubSync, APullKeepsChangesThatWereNotPushed) {
   EXPECT_EQ(DifferenceOf("Desk", folder_ / "a", folder_ / "b"), "");
 }
 
+TEST_F(HubSync, ARenamingIsPushedAlsoAfterAPullThatMerged) {
+  const std::uint64_t on_b = ShareMap("Desk");
+  AddSampleSignpost(folder_ / "a", "Desk", "from-a", "A");
+  Open("b").Rename(on_b, "Table");
+  PushFrom("a");
+  EXPECT_EQ(PullTo("b").problems, 0);
+  EXPECT_EQ(NamesIn(Open("b")), "Table");
+  AddSampleSignpost(folder_ / "a", "Desk", "again-from-a", "A");
+  PushFrom("a");
+  EXPECT_EQ(PullTo("b").problems, 0) << "before the new name was pushed";
+  PushFrom("b");
+  PullTo("a");
+  EXPECT_EQ(NamesIn(Open("a")), "Table");
+  EXPECT_EQ(TextsIn(Open("a"), Open("a").FindByName("Table").key), "sign-1=Hello from-a=A again-from-a=A");
+  EXPECT_EQ(DifferenceOf("Table", folder_ / "a", folder_ / "b"), "");
+  EXPECT_THAT(PushFrom("b").lines, testing::IsEmpty());
+}
+
 TEST_F(HubSync, AMapWhoseKeyframesTwoChangedBecomesTwoMaps) {
   const std::uint64_t on_b = ShareMap("Desk");
   {
