@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
+#include <sstream>
 
 #include "maps/hub/restored_links.h"
 #include "maps/hub/sync_session.h"
@@ -14,6 +15,22 @@ std::string ContentOf(const HubTour& tour) {
   std::string text = tour.language + "\n" + std::to_string(tour.minutes);
   for (const std::string& stop : tour.stops) text += "\n" + stop;
   return text;
+}
+
+// What a tour of this content has become here by the removal of maps.
+std::string WithoutLostStops(const SyncSession& session, const std::string& content) {
+  constexpr int kLinesBeforeStops = 2;
+  std::istringstream lines(content);
+  std::string left;
+  std::string line;
+  for (int i = 0; std::getline(lines, line); ++i) {
+    if (i >= kLinesBeforeStops) {
+      const MapLink* link = session.LinkTo(line);
+      if (link == nullptr || session.local().StampOf(link->key).empty()) continue;
+    }
+    left += (i == 0 ? "" : "\n") + line;
+  }
+  return left;
 }
 
 // The tour as the hub has it; empty if a stop is not on the hub yet.
@@ -111,6 +128,9 @@ void PushTour(SyncSession* session, const Tour& tour, const std::vector<HubTour>
     return;
   }
   std::int64_t base = on_hub == nullptr ? 0 : on_hub->revision;
+  // Nobody has changed it here: the next pull brings what the hub has.
+  if (link != nullptr && link->revision != base && WithoutLostStops(*session, link->content) == content)
+    return;
   if (on_hub != nullptr && !on_hub->removed && ContentOf(*on_hub) != content) {
     if (link == nullptr || link->revision != base) {
       mine->name = MoveAside(session, tour.name, theirs);
@@ -133,7 +153,9 @@ void PullTour(SyncSession* session, const HubTour& theirs, const std::vector<Tou
     const std::optional<HubTour> mine = ForHub(*session, *here);
     content = mine ? ContentOf(*mine) : "not on the hub";
   }
-  const bool is_unchanged = link != nullptr && link->content == content;
+  // A map that was removed on the hub has just been removed from the tours here.
+  const bool is_unchanged =
+      link != nullptr && (link->content == content || WithoutLostStops(*session, link->content) == content);
   if (link != nullptr && link->revision == theirs.revision && (is_unchanged || here == nullptr)) {
     // A map that was missing then may be here now.
     if (here == nullptr || ForLibrary(session, theirs) == *here) return;

@@ -296,6 +296,40 @@ TEST_F(HubSync, ToursStopAtTheSameMaps) {
   EXPECT_THAT(PushFrom("a").lines, testing::IsEmpty());
 }
 
+TEST_F(HubSync, ATourStaysOneTourWhenAMapOfItIsRemovedOnTheHub) {
+  {
+    Library a = Open("a");
+    a.ReserveKeys(3);
+    const std::uint64_t desk = AddSampleMap(&a, "Desk", 1), hall = AddSampleMap(&a, "Hall", 2);
+    AddSampleMap(&a, "Shelf", 3);
+    a.ChangeTours([&](std::vector<Tour>* tours) { tours->push_back({"Short", {hall, desk}, "de", 20}); });
+  }
+  PushFrom("a");
+  for (const char* device : {"b", "c"}) PullTo(device);
+  {
+    Library a = Open("a");
+    const std::uint64_t shelf = a.FindByName("Shelf").key, desk = a.FindByName("Desk").key;
+    a.ChangeTours([&](std::vector<Tour>* tours) { tours->front().stops = {shelf, desk}; });
+    a.Remove(a.FindByName("Hall").key);
+  }
+  SyncOptions options = SampleSync(Url(), folder_ / "a");
+  options.remove = true;
+  EXPECT_EQ(Push(options).problems, 0);
+  {
+    Library c = Open("c");
+    c.Remove(c.FindByName("Hall").key);
+  }
+  EXPECT_THAT(LinesOf(PushFrom("c")), Not(HasSubstr("was changed both here and on the hub")));
+  for (const char* device : {"b", "c"}) {
+    EXPECT_EQ(PullTo(device).problems, 0);
+    const Library library = Open(device);
+    ASSERT_EQ(library.Tours().size(), 1u) << device;
+    EXPECT_EQ(library.Tours()[0].stops,
+              (std::vector{library.FindByName("Shelf").key, library.FindByName("Desk").key}));
+    EXPECT_THAT(PushFrom(device).lines, testing::IsEmpty()) << device;
+  }
+}
+
 TEST_F(HubSync, AnInterruptedPullGoesOnWhereItWas) {
   {
     Library a = Open("a");
