@@ -358,6 +358,9 @@ void Database::CopyTo(const fs::path& path) const {
 }
 
 std::int64_t Database::Bytes() const {
+  const std::int64_t stated = Number("PRAGMA page_count") * Number("PRAGMA page_size");
+  // The pages of a transaction that writes are in memory until it is committed.
+  if (sqlite3_txn_state(connection_.get(), "main") == SQLITE_TXN_WRITE) return stated;
   sqlite3_file* const file = OpenFile(connection_.get());
   sqlite3_int64 size = 0;
   if (!file || file->pMethods->xFileSize(file, &size) != SQLITE_OK) return 0;
@@ -366,8 +369,7 @@ std::int64_t Database::Bytes() const {
   const std::uintmax_t log_size = fs::file_size(log, error);
   // Neither the size in the file's header nor the size of an old log proves how much data there is, so the
   // smaller estimate counts.
-  return std::min<std::int64_t>(size + (error ? 0 : static_cast<std::int64_t>(log_size)),
-                                Number("PRAGMA page_count") * Number("PRAGMA page_size"));
+  return std::min<std::int64_t>(size + (error ? 0 : static_cast<std::int64_t>(log_size)), stated);
 }
 
 bool Database::EndsWithWholePage() const {

@@ -86,7 +86,7 @@ class Database {
   // read the missing bytes as zeros. When there is a log, the last page may not have been written yet, so the
   // answer is true.
   bool EndsWithWholePage() const;
-  // The size of the library in bytes, including its log.
+  // The size of the library in bytes, including its log and what a transaction has written so far.
   std::int64_t Bytes() const;
 
   // Copies the current state of the file, including the log, to a new file, which is on disk when this

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <gmock/gmock.h>
 
+#include "app/session/library_scene.h"
 #include "maps/hub/administration.h"
 #include "maps/hub/hub.h"
 #include "maps/hub/sync_state.h"
@@ -48,6 +49,23 @@ TEST_F(HubSync, AMapArrivesAsItIs) {
   EXPECT_THAT(Open("b").Verify(), testing::IsEmpty());
   EXPECT_THAT(PushFrom("a").lines, testing::IsEmpty()) << "nothing has changed since";
   EXPECT_THAT(PullTo("b").lines, testing::IsEmpty());
+}
+
+TEST_F(HubSync, ASmallMapWithLargeImagesIsReceivedByANewDevice) {
+  {
+    Library a = Open("a");
+    MapRecord record;
+    record.key = a.NewKey();
+    record.name = "Desk";
+    // Both images together are smaller than what SQLite keeps in memory before it writes any of it.
+    record.snapshot = MakeSampleMap(1, {.keyframes = 2, .points = 5, .width_px = 1280, .height_px = 960});
+    record.scene = std::make_shared<const SceneRecord>(app::RecordFromScene(content::Scene()));
+    a.Save(record);
+  }
+  EXPECT_EQ(PushFrom("a").problems, 0);
+  const SyncReport report = PullTo("b");
+  EXPECT_EQ(report.problems, 0) << LinesOf(report);
+  EXPECT_EQ(DifferenceOf("Desk", folder_ / "a", folder_ / "b"), "");
 }
 
 TEST_F(HubSync, OnlyWhatChangedIsTransferred) {
