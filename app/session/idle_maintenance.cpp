@@ -14,8 +14,9 @@
 namespace docent::app {
 
 bool IdleMaintenance::IsIdle(const SessionMap& map) const {
+  // Content that could not be read would not move along.
   return map.Exists() && map.snapshot && !map.NeedsSave() && maps::MayChangeStructure(map.policy) &&
-         !system_.IsInUse(map.key);
+         !map.content_left_out && !system_.IsInUse(map.key);
 }
 
 std::vector<IdleMap> IdleMaintenance::MapsToAdjust() const {

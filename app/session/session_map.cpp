@@ -22,7 +22,14 @@ void SessionMap::Discard() {
 void SessionMap::UpdateSnapshot(std::shared_ptr<const engine::MapSnapshot> newer) {
   const auto before = std::exchange(snapshot, std::move(newer));
   SetMesh(std::move(mesh), std::move(light));
-  if (before && snapshot) MoveContent(*before, *snapshot, &follower, &scene, &history);
+  std::shared_ptr<const content::Scene> moved = scene;
+  if (before && snapshot && MoveContent(*before, *snapshot, &follower, &moved, &history))
+    Follow(std::move(moved));
+}
+
+void SessionMap::Follow(std::shared_ptr<const content::Scene> moved) {
+  if (content_left_out && scene == saved_scene) saved_scene = moved;
+  scene = std::move(moved);
 }
 
 void SessionMap::SetMesh(std::shared_ptr<const engine::MapMesh> made,
@@ -49,7 +56,8 @@ engine::MapPermissions SessionMap::Permissions() const {
     permissions.bounds.emplace();  // empty: a bounded map without bounds accepts no keyframe
     if (bounds) permissions.bounds.emplace(bounds->min, bounds->max);
   }
-  permissions.join = policy == maps::Policy::kOpen;
+  // The map that a joined one ends in would not get what was left out.
+  permissions.join = policy == maps::Policy::kOpen && !content_left_out;
   // A map that was saved or that has content is kept in any case.
   permissions.discard = !saved_snapshot && scene->entities.empty();
   return permissions;

@@ -39,6 +39,10 @@ struct SessionMap {
   // from it, since signposts get the keys and names of their maps when they are read.
   std::uint64_t stored_scene = 0;
 
+  // Content that is damaged was left out when the map was read. The library keeps it until the content is
+  // edited here: content that only moved along with keyframes or names of maps counts as stored.
+  bool content_left_out = false;
+
   // Why its content could not be stored last; empty if it could.
   std::string save_problem;
 
@@ -65,6 +69,9 @@ struct SessionMap {
   // Replaces the snapshot by a newer one of the mapper; content moves along with its anchors, and a mesh that
   // no longer fits is dropped.
   void UpdateSnapshot(std::shared_ptr<const engine::MapSnapshot> newer);
+
+  // Replaces the scene by one that follows from another change and is no edit of the content.
+  void Follow(std::shared_ptr<const content::Scene> moved);
 
   // Takes a mesh and the light on it if the mesh fits the snapshot.
   void SetMesh(std::shared_ptr<const engine::MapMesh> made,

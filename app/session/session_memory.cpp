@@ -61,12 +61,18 @@ void SessionMemory::AddLoadedMap(const maps::StoredMap& stored) {
   const std::string where = library_->file() + ", map '" + stored.info.name + "'";
   std::vector<std::string> problems = stored.lost_content;
   auto scene = std::make_shared<content::Scene>(ReadableScene(stored.scene, where, &assets, &problems));
+  const bool content_left_out = !problems.empty();
   content::EditHistory history;
-  if (options_.may_write && problems.empty())
+  if (options_.may_write && !content_left_out)
     history = StoredHistory(stored.info.key, where, &assets, &problems);
   const std::shared_ptr<const engine::LightEstimate> light =
       stored.mesh && options_.room_light ? LightOn(*stored.snapshot, *stored.mesh) : nullptr;
-  Install(stored, std::move(scene), std::move(history), light, problems, &assets);
+  {
+    const std::scoped_lock lock(mutex_);
+    for (const std::string& problem : problems) state_.AddEvent(state_.LastTime(), "warning", problem);
+    assets_.Merge(&assets);
+    Install(stored, std::move(scene), std::move(history), light, content_left_out);
+  }
   if (!options_.may_write) ReloadIfChangedSince(stored.info);
 }
 
@@ -84,10 +90,7 @@ void SessionMemory::ReloadIfChangedSince(const maps::MapInfo& read) {
 void SessionMemory::Install(const maps::StoredMap& stored, std::shared_ptr<content::Scene> scene,
                             content::EditHistory history,
                             const std::shared_ptr<const engine::LightEstimate>& light,
-                            const std::vector<std::string>& problems, AssetCache* assets) {
-  const std::scoped_lock lock(mutex_);
-  for (const std::string& problem : problems) state_.AddEvent(state_.LastTime(), "warning", problem);
-  assets_.Merge(assets);
+                            bool content_left_out) {
   // A map that another process saved since the session began is not part of the session. A known one may have
   // been removed while it was read.
   SessionMap* const known = state_.FindMap(stored.info.key);
@@ -96,6 +99,7 @@ void SessionMemory::Install(const maps::StoredMap& stored, std::shared_ptr<conte
   map.snapshot = map.saved_snapshot = stored.snapshot;
   ResolveSignposts(scene.get());
   map.scene = map.saved_scene = std::move(scene);
+  map.content_left_out = content_left_out;
   map.stored_scene = maps::SceneTextChecksum(stored.scene.text);
   history.RetargetSignposts([this](content::Signpost* signpost) { return state_.Resolve(signpost); });
   map.history = std::move(history);

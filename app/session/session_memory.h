@@ -54,9 +54,10 @@ class SessionMemory {
  private:
   // On the pager's thread, without the mutex.
   void AddLoadedMap(const maps::StoredMap& stored);
+  // With the session's mutex held.
   void Install(const maps::StoredMap& stored, std::shared_ptr<content::Scene> scene,
                content::EditHistory history, const std::shared_ptr<const engine::LightEstimate>& light,
-               const std::vector<std::string>& problems, AssetCache* assets);
+               bool content_left_out);
   void ReloadIfChangedSince(const maps::MapInfo& read);
   content::EditHistory StoredHistory(std::uint64_t key, const std::string& where, AssetCache* assets,
                                      std::vector<std::string>* problems) const;

@@ -53,6 +53,7 @@ bool SessionSaving::AddContent(SessionMap* map, Timestamp time, maps::MapRecord*
     return false;
   }
   map->save_problem.clear();
+  map->content_left_out = false;
   map->stored_scene = maps::SceneTextChecksum(record->scene->text);
   return true;
 }
@@ -123,7 +124,7 @@ void SessionSaving::ReportFailure(Timestamp time) {
   for (auto& [key, map] : state_.maps) {
     if (!map.changed) continue;
     if (maps::MayChangeStructure(map.policy)) map.saved_snapshot.reset();
-    if (maps::MayChangeContent(map.policy)) map.saved_scene.reset();
+    if (maps::MayChangeContent(map.policy) && !map.content_left_out) map.saved_scene.reset();
   }
 }
 

@@ -143,7 +143,7 @@ void SessionState::Retarget(std::uint64_t from_key, const std::string& from, std
       changed = retarget(&entity.signpost) || changed;
     }
     // The history is saved with the scene.
-    if (changed) map.scene = std::move(scene);
+    if (changed) map.Follow(std::move(scene));
   }
 }
 

@@ -13,11 +13,14 @@
 
 #include "app/session/library_scene.h"
 #include "app/session/maintenance_order.h"
+#include "app/session/session_map.h"
+#include "content/asset.h"
 #include "engine/base/random.h"
 #include "engine/vision/features.h"
 #include "maps/maintenance/maintenance.h"
 #include "tests/app/support/simulated_session.h"
 #include "tests/app/support/temporary_folder.h"
+#include "tests/maps/map_samples.h"
 
 namespace docent::app {
 namespace {
@@ -160,6 +163,53 @@ TEST_F(IdleMaps, AreNotAdjustedWhenAnotherProgramHasChangedTheirContent) {
   EXPECT_THAT(done[0], HasSubstr("Less: "));
   EXPECT_EQ(library.FindByName("Open").revision, before->revision);
   EXPECT_THAT(library.LoadScene(open).text, HasSubstr("theirs"));
+}
+
+// A map with damaged content stays as it is, because what cannot be read would be stored no more.
+TEST_F(IdleMaps, KeepContentThatCannotBeRead) {
+  const auto simulation = Room(1);
+  std::uint64_t open = 0;
+  {
+    auto library = maps::Library::Open(file_, maps::Access::kReadWrite);
+    open = library.FindByName("Open").key;
+    content::Scene scene = SignOfMaintenance("here");
+    content::Entity fox;
+    fox.kind = content::Entity::Kind::kModel;
+    fox.name = "fox";
+    fox.model.asset = std::make_shared<content::Asset>(
+        content::ImportAsset(folder_.Write("fox.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n")));
+    scene.entities.push_back(fox);
+    library.Save({open, "", maps::Policy::kOpen, nullptr,
+                  std::make_shared<maps::SceneRecord>(RecordFromScene(scene))});
+    library.Save({library.NewKey(), "Less", maps::Policy::kOpen, Crooked(0.003), nullptr});
+  }
+  maps::RunSql(file_, "UPDATE assets SET data = zeroblob(length(data))");
+  auto library = maps::Library::Open(file_, maps::Access::kReadWrite);
+  Session session(Options(Pace::kEager, ""), LensOf(*simulation), &library);
+  const std::vector<std::string> done = AwaitMaintenance(&session);
+  session.Finish();
+  ASSERT_EQ(done.size(), 1u);
+  EXPECT_THAT(done[0], HasSubstr("Less: ")) << "the map with the larger error comes first";
+  std::vector<std::string> lost;
+  EXPECT_THAT(library.LoadScene(open, &lost).text, HasSubstr("fox"));
+}
+
+TEST(SessionMap, ContentThatOnlyMovedIsNotStoredInThePlaceOfWhatCannotBeRead) {
+  SessionMap map;
+  map.snapshot = map.saved_snapshot = WalkedMap();
+  map.scene = map.saved_scene = std::make_shared<const content::Scene>(SignOfMaintenance("here"));
+  map.content_left_out = true;
+  auto shifted = std::make_shared<engine::MapSnapshot>(*WalkedMap());
+  for (engine::MapPoint& point : shifted->points) {
+    if (!point.infinite()) point.point_in_map.x() += 0.1;
+  }
+  const auto before = map.scene;
+  map.UpdateSnapshot(shifted);
+  ASSERT_NE(map.scene, before) << "the sign has not moved along";
+  EXPECT_TRUE(map.NeedsSave());
+  EXPECT_EQ(map.scene, map.saved_scene);
+  map.scene = std::make_shared<const content::Scene>(SignOfMaintenance("edited"));
+  EXPECT_NE(map.scene, map.saved_scene);
 }
 
 TEST_F(IdleMaps, AreAdjustedWithContentThatTheSessionReadsInAnotherForm) {
