@@ -185,7 +185,10 @@ void PullTour(SyncSession* session, const HubTour& theirs, const std::vector<Tou
 void PushTours(SyncSession* session, bool may_remove) {
   const std::vector<HubTour> theirs = session->hub().Tours();
   const std::vector<TourLink> links = TourLinks(session, theirs);
+  const int problems = session->report().problems;
   const std::vector<Tour> tours = LocalTours(session);
+  // A damaged tour is left out there, which does not mean that somebody removed it.
+  const bool are_all_known = session->report().problems == problems;
   for (const Tour& tour : tours) {
     try {
       PushTour(session, tour, theirs, TourNamed(links, tour.name), may_remove);
@@ -200,16 +203,23 @@ void PushTours(SyncSession* session, bool may_remove) {
     if (TourNamed(tours, link.name) != nullptr || on_hub == nullptr || on_hub->removed ||
         !session->options().remove || on_hub->revision != link.revision)
       continue;
-    if (!may_remove) {
+    if (!may_remove || !are_all_known) {
       session->SayProblem("The tour '" + link.name +
-                          "' was removed here and stays on the hub until every map is saved there");
+                          "' was not removed from the hub, because not everything here could be read and "
+                          "saved there");
       continue;
     }
     HubTour removed = *on_hub;
     removed.removed = true;
-    session->hub().SaveTour(removed, on_hub->revision);
-    session->RemoveTour(link.name);
-    session->Say("The tour '" + link.name + "' was removed from the hub");
+    try {
+      session->hub().SaveTour(removed, on_hub->revision);
+      session->RemoveTour(link.name);
+      session->Say("The tour '" + link.name + "' was removed from the hub");
+    } catch (const HubUnreachable&) {
+      throw;
+    } catch (const Error& error) {
+      session->SayProblem("The tour '" + link.name + "' was not removed from the hub: " + error.what());
+    }
   }
 }
 

@@ -348,6 +348,22 @@ TEST_F(HubSync, ATourStaysOneTourWhenAMapOfItIsRemovedOnTheHub) {
   }
 }
 
+TEST_F(HubSync, ATourThatIsDamagedHereStaysOnTheHub) {
+  {
+    Library a = Open("a");
+    const std::uint64_t desk = AddSampleMap(&a, "Desk", 1);
+    a.ChangeTours([&](std::vector<Tour>* tours) { tours->push_back({"Short", {desk}, "", 20}); });
+  }
+  PushFrom("a");
+  RunSql(folder_ / "a", "UPDATE tours SET checksum = checksum + 1");
+  SyncOptions options = SampleSync(Url(), folder_ / "a");
+  options.remove = true;
+  EXPECT_GT(Push(options).problems, 0);
+  const std::vector<HubTour> tours = Hub(Url()).Tours();
+  ASSERT_EQ(tours.size(), 1u);
+  EXPECT_FALSE(tours[0].removed);
+}
+
 TEST_F(HubSync, AnInterruptedPullGoesOnWhereItWas) {
   {
     Library a = Open("a");
