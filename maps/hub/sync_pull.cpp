@@ -184,17 +184,12 @@ void PullWithPatience(SyncSession* session, const std::string& id) {
 // Gives each map of the hub a key here, so that signposts can lead to maps that come later.
 void ReserveKeysForMaps(SyncSession* session) {
   std::vector<std::string> ids;
+  bool has_new = false;
   for (const HubHead& head : session->heads()) {
-    if (session->LinkTo(head.id) == nullptr) ids.push_back(head.id);
+    ids.push_back(head.id);
+    has_new = has_new || session->LinkTo(head.id) == nullptr;
   }
-  if (ids.empty()) return;
-  std::uint64_t key = session->local().library().ReserveKeys(ids.size());
-  for (const std::string& id : ids) {
-    MapLink link;
-    link.key = key++;
-    link.id = id;
-    session->PutLink(link);
-  }
+  if (has_new) session->AddLinks(ids);
 }
 
 // The maps that the visitor is in, by their ids on the hub.

@@ -116,6 +116,12 @@ void SyncSession::PutLink(const MapLink& link) {
   links_.push_back(link);
 }
 
+void SyncSession::AddLinks(const std::vector<std::string>& ids) {
+  RenewIdentity();
+  links_ = state_.AddLinks(ids, [this](std::size_t count) { return local_.library().ReserveKeys(count); });
+  ForgetLostRevisions(restorations_, heads_, hub_.may_save(), &links_);
+}
+
 void SyncSession::RemoveLink(std::uint64_t key) {
   RenewIdentity();
   state_.RemoveLink(key);

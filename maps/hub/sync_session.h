@@ -53,6 +53,9 @@ class SyncSession {
   const MapLink* LinkOf(std::uint64_t key) const;
   const MapLink* LinkTo(const std::string& id) const;
   void PutLink(const MapLink& link);
+  // Gives those of these maps of the hub that have no link a key here. Other programs may have changed links
+  // meanwhile, which this reads again.
+  void AddLinks(const std::vector<std::string>& ids);
   void RemoveLink(std::uint64_t key);
   const std::vector<MapLink>& links() const { return links_; }
   void PutTour(const TourLink& tour);

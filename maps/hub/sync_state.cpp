@@ -3,6 +3,8 @@
 
 #include <algorithm>
 #include <array>
+#include <iterator>
+#include <set>
 #include <string_view>
 
 #include "engine/base/error.h"
@@ -139,6 +141,28 @@ void SyncState::Put(const MapLink& link) {
       .Bind(11, link.created)
       .Bind(12, link.restoration)
       .Run();
+}
+
+std::vector<MapLink> SyncState::AddLinks(const std::vector<std::string>& ids,
+                                         const std::function<std::uint64_t(std::size_t count)>& reserve) {
+  Transaction transaction(database_, Transaction::Kind::kWrite);
+  std::vector<MapLink> links = Links();
+  std::set<std::string> known;
+  for (const MapLink& link : links) known.insert(link.id);
+  std::vector<std::string> missing;
+  std::copy_if(ids.begin(), ids.end(), std::back_inserter(missing),
+               [&](const std::string& id) { return !known.contains(id); });
+  if (missing.empty()) return links;
+  std::uint64_t key = reserve(missing.size());
+  for (const std::string& id : missing) {
+    MapLink link;
+    link.key = key++;
+    link.id = id;
+    Put(link);
+    links.push_back(link);
+  }
+  transaction.Commit();
+  return links;
 }
 
 void SyncState::RemoveLink(std::uint64_t key) {

@@ -52,6 +52,10 @@ class SyncState {
   std::vector<MapLink> Links() const;  // By key.
   // Adds or replaces the link of a map.
   void Put(const MapLink& link);
+  // Adds links to those of these maps of the hub that have none, with keys that `reserve` returns the first
+  // of, and returns all links. Two programs do so one after the other, so that a map has one key only.
+  std::vector<MapLink> AddLinks(const std::vector<std::string>& ids,
+                                const std::function<std::uint64_t(std::size_t count)>& reserve);
   void RemoveLink(std::uint64_t key);
 
   std::vector<TourLink> Tours() const;  // By name.

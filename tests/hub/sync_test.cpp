@@ -4,6 +4,7 @@
 #include "app/session/library_scene.h"
 #include "maps/hub/administration.h"
 #include "maps/hub/hub.h"
+#include "maps/hub/sync_session.h"
 #include "maps/hub/sync_state.h"
 #include "tests/hub/hub_samples.h"
 #include "tests/hub/private_server.h"
@@ -173,6 +174,26 @@ TEST_F(HubSync, ARenamingIsPushedAlsoAfterAPullThatMerged) {
   EXPECT_EQ(TextsIn(Open("a"), Open("a").FindByName("Table").key), "sign-1=Hello from-a=A again-from-a=A");
   EXPECT_EQ(DifferenceOf("Table", folder_ / "a", folder_ / "b"), "");
   EXPECT_THAT(PushFrom("b").lines, testing::IsEmpty());
+}
+
+// As two tours with one library, which the hub tells of a new map at the same time.
+TEST_F(HubSync, TwoPullsOfOneLibraryGiveANewMapTheSameKey) {
+  ShareMap("Desk");
+  const SyncOptions options = SampleSync(Url(), folder_ / "b");
+  {
+    Library a = Open("a");
+    AddSampleMap(&a, "Hall", 2);
+  }
+  PushFrom("a");
+  SyncSession one(options, CreateIfMissing::kNo), other(options, CreateIfMissing::kNo);
+  const HubHead* const head = one.HeadNamed("Hall");
+  ASSERT_NE(head, nullptr);
+  one.AddLinks({head->id});
+  other.AddLinks({head->id});
+  ASSERT_NE(other.LinkTo(head->id), nullptr);
+  EXPECT_EQ(other.LinkTo(head->id)->key, one.LinkTo(head->id)->key);
+  EXPECT_EQ(PullTo("b").problems, 0);
+  EXPECT_EQ(NamesIn(Open("b")), "Desk,Hall");
 }
 
 TEST_F(HubSync, AMapWhoseKeyframesTwoChangedBecomesTwoMaps) {
