@@ -50,10 +50,8 @@ bool LinkEqualMap(SyncSession* session, const MapLink& link, const HubRevision& 
     if (StructureDigest(mine.facts, mine.manifest) != StructureDigest(theirs.facts, theirs.manifest) ||
         mine.manifest.at("scene") != theirs.manifest.at("scene"))
       return false;
-    LocalMap agreed = mine;
-    agreed.facts.info.policy = theirs.facts.info.policy;
     session->RemoveLink(link.key);
-    session->PutLink(AgreedLink(*session, link.id, theirs.revision, agreed, info.name));
+    LinkEqual(session, link.id, theirs, mine, info.name);
     return true;
   }
   return false;
@@ -133,7 +131,10 @@ void PullMap(SyncSession* session, const HubHead& head) {
   const std::optional<HubRevision> theirs = session->hub().Revision(head.id, head.revision);
   if (!theirs) throw HubConflict("the map was changed on the hub meanwhile");
   if (stamp.empty()) {
-    if (link.revision == 0 && LinkEqualMap(session, link, *theirs)) return;
+    if (link.revision == 0 && LinkEqualMap(session, link, *theirs)) {
+      if (session->LinkTo(head.id)->revision == 0) PullMap(session, head);
+      return;
+    }
     WriteTheirs(session, link, *theirs, {}, "");
     session->Say(QuotedName(head.name) + " was added");
     return;

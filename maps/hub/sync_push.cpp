@@ -28,9 +28,7 @@ bool AdoptEqualMap(SyncSession* session, const LocalMap& mine, const HubHead& he
       StructureDigest(theirs->facts, theirs->manifest) != StructureDigest(mine.facts, mine.manifest) ||
       theirs->manifest.at("scene") != mine.manifest.at("scene"))
     return false;
-  LocalMap agreed = mine;
-  agreed.facts.info.policy = theirs->facts.info.policy;
-  session->PutLink(AgreedLink(*session, head.id, head.revision, agreed, local_name));
+  LinkEqual(session, head.id, *theirs, mine, local_name);
   session->Say(QuotedName(head.name) + " is the same map as on the hub");
   return true;
 }
@@ -128,6 +126,11 @@ void PushMap(SyncSession* session, const MapInfo& info) {
       session->Say(QuotedName(info.name) + " was removed on the hub; docent maps pull removes it here");
     } else {
       AddToHub(session, info, link, head == nullptr ? 0 : head->revision);
+      // The hub has an equal map whose policy is still to be taken.
+      if (const MapLink linked = *session->LinkOf(info.key); linked.revision == 0) {
+        if (const HubHead* equal = session->HeadOf(linked.id))
+          MergeAndSave(session, session->local().library().Find(info.key), linked, *equal);
+      }
     }
     return;
   }

@@ -274,6 +274,18 @@ bool IsSame(const LocalMap& mine, const HubRevision& theirs) {
   return mine.manifest == theirs.manifest && a.name == b.name && a.policy == b.policy && a.bounds == b.bounds;
 }
 
+void LinkEqual(SyncSession* session, const std::string& id, const HubRevision& theirs, const LocalMap& mine,
+               const std::string& local_name) {
+  MapLink link;
+  link.key = mine.facts.info.key;
+  link.id = id;
+  link.local_name = local_name;
+  if (mine.facts.info.policy == theirs.facts.info.policy &&
+      mine.facts.info.bounds == theirs.facts.info.bounds)
+    link = AgreedLink(*session, id, theirs.revision, mine, local_name);
+  session->PutLink(link);
+}
+
 MapLink SplitOff(SyncSession* session, const MapLink& link) {
   const std::string name = session->local().library().Find(link.key).name;
   const std::string other = FreeName(link.local_name.empty() ? name : link.name, session->NamesInUse());

@@ -120,6 +120,10 @@ bool IsChanged(const MapLink& link, const LocalMap& map);
 void TakeEqualParts(const HubRevision& theirs, LocalMap* mine);
 // Whether a map is this revision.
 bool IsSame(const LocalMap& mine, const HubRevision& theirs);
+// Links a map of the library with an equal one of the hub. Policy and bounds may differ; then the link has
+// the revision 0, as if both sides had nothing in common, and the hub's are still to be taken.
+void LinkEqual(SyncSession* session, const std::string& id, const HubRevision& theirs, const LocalMap& mine,
+               const std::string& local_name);
 // Gives the map in the library another id and name, because its structure was changed on both sides. Returns
 // its link.
 MapLink SplitOff(SyncSession* session, const MapLink& link);

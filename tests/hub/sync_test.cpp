@@ -247,6 +247,26 @@ TEST_F(HubSync, ACopyOfALibraryIsNotADuplicate) {
   EXPECT_EQ(NamesIn(Open("copy")), "Desk");
 }
 
+TEST_F(HubSync, AnEqualMapTakesTheHubsPolicyWhenTheRecordOfTheExchangeIsLost) {
+  ShareMap("Desk");
+  PullTo("c");
+  {
+    Library a = Open("a");
+    a.SetPolicy(a.FindByName("Desk").key, Policy::kReadOnly);
+  }
+  PushFrom("a");
+  for (const char* device : {"b", "c"}) std::filesystem::remove(SyncStatePath(folder_ / device));
+  EXPECT_EQ(PullTo("b").problems, 0);
+  EXPECT_EQ(PushFrom("c").problems, 0);
+  EXPECT_EQ(Hub(Url()).Heads().at(0).revision, 2) << "nothing is to be saved there";
+  for (const char* device : {"b", "c"}) {
+    EXPECT_EQ(NamesIn(Open(device)), "Desk") << device;
+    EXPECT_EQ(Open(device).FindByName("Desk").policy, Policy::kReadOnly) << device;
+    EXPECT_THAT(PushFrom(device).lines, testing::IsEmpty()) << device;
+    EXPECT_THAT(PullTo(device).lines, testing::IsEmpty()) << device;
+  }
+}
+
 TEST_F(HubSync, AMapIsRemovedOnBothSidesOnlyIfThatIsAskedFor) {
   ShareMap("Desk");
   {
