@@ -4,22 +4,12 @@
 #include "maps/hub/pull_order.h"
 #include "maps/hub/sha256.h"
 #include "maps/hub/sync_session.h"
-#include "maps/library/map_names.h"
 
 namespace docent::maps {
 
 namespace {
 
 constexpr int kPullAttempts = 5;  // While others save the same map at the same time.
-
-// A name for a map of the hub that no other map of the library has.
-std::string LocalName(SyncSession* session, const std::string& name, std::uint64_t key) {
-  std::set<std::string> taken;
-  for (const MapInfo& info : session->local().library().List()) {
-    if (info.key != key) taken.insert(info.name);
-  }
-  return FreeName(name, taken);
-}
 
 // Writes a revision of the hub into the library, where `mine` is the map as it is, and links both.
 void WriteTheirs(SyncSession* session, const MapLink& link, const HubRevision& theirs, const LocalMap& mine,
@@ -35,7 +25,7 @@ void WriteTheirs(SyncSession* session, const MapLink& link, const HubRevision& t
   if (!is_new) lock.emplace(session->options().library, SessionLockKind::kReplace);
   map.facts.info.key = link.key;
   LocalMap local = map;
-  local.facts.info.name = LocalName(session, theirs.facts.info.name, link.key);
+  local.facts.info.name = LocalName(*session, theirs.facts.info.name, link.key);
   map.state = session->local().Write(local, session->ToLocal(), stamp);
   session->report().changed_keys.push_back(link.key);
   session->PutLink(AgreedLink(*session, link.id, theirs.revision, map, local.facts.info.name));
@@ -82,7 +72,7 @@ void MergeHere(SyncSession* session, const MapInfo& info, const MapLink& link, c
   map.items = session->Receive(map.manifest, sources);
   const SessionLock lock = session->local().LockForReplacing();
   LocalMap local = map;
-  local.facts.info.name = LocalName(session, map.facts.info.name, info.key);
+  local.facts.info.name = LocalName(*session, map.facts.info.name, info.key);
   map.state = session->local().Write(local, session->ToLocal(), mine.state.stamp);
   session->report().changed_keys.push_back(info.key);
   // Both agree on what the hub has; what was changed here since is still to be pushed.

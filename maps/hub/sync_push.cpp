@@ -106,8 +106,9 @@ void MergeAndSave(SyncSession* session, const MapInfo& info, const MapLink& link
   session->local().CheckStamp(info.key, mine.state.stamp);
   const std::int64_t revision = is_theirs ? head.revision : session->Send(complete, link.id, head.revision);
   LocalMap local = complete;
-  local.facts.info.name =
-      info.name == link.local_name && map.facts.info.name == link.name ? info.name : map.facts.info.name;
+  local.facts.info.name = info.name == link.local_name && map.facts.info.name == link.name
+                              ? info.name
+                              : LocalName(*session, map.facts.info.name, info.key);
   complete.state = session->local().Write(local, session->ToLocal(), mine.state.stamp);
   session->report().changed_keys.push_back(info.key);
   session->PutLink(AgreedLink(*session, link.id, revision, complete, local.facts.info.name));

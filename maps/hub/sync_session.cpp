@@ -274,6 +274,14 @@ bool IsSame(const LocalMap& mine, const HubRevision& theirs) {
   return mine.manifest == theirs.manifest && a.name == b.name && a.policy == b.policy && a.bounds == b.bounds;
 }
 
+std::string LocalName(const SyncSession& session, const std::string& name, std::uint64_t key) {
+  std::set<std::string> taken;
+  for (const MapInfo& info : session.local().library().List()) {
+    if (info.key != key) taken.insert(info.name);
+  }
+  return FreeName(name, taken);
+}
+
 void LinkEqual(SyncSession* session, const std::string& id, const HubRevision& theirs, const LocalMap& mine,
                const std::string& local_name) {
   MapLink link;

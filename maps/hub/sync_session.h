@@ -120,6 +120,8 @@ bool IsChanged(const MapLink& link, const LocalMap& map);
 void TakeEqualParts(const HubRevision& theirs, LocalMap* mine);
 // Whether a map is this revision.
 bool IsSame(const LocalMap& mine, const HubRevision& theirs);
+// A name for the map with this key that no other map of the library has.
+std::string LocalName(const SyncSession& session, const std::string& name, std::uint64_t key);
 // Links a map of the library with an equal one of the hub. Policy and bounds may differ; then the link has
 // the revision 0, as if both sides had nothing in common, and the hub's are still to be taken.
 void LinkEqual(SyncSession* session, const std::string& id, const HubRevision& theirs, const LocalMap& mine,

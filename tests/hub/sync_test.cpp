@@ -239,6 +239,24 @@ TEST_F(HubSync, TwoMapsOfOneNameStayTwoMaps) {
   EXPECT_EQ(NamesIn(Open("a")), "Desk,Desk (2)");
 }
 
+TEST_F(HubSync, AMergingPushGivesAMapAnotherNameHereWhereTheHubsNameIsTaken) {
+  const std::uint64_t on_b = ShareMap("Desk");
+  {
+    Library a = Open("a"), b = Open("b");
+    a.Rename(a.FindByName("Desk").key, "Hall");
+    AddSampleMap(&b, "Hall", 8);
+  }
+  AddSampleSignpost(folder_ / "b", "Desk", "from-b", "B");
+  PushFrom("a");
+  const SyncReport report = PushFrom("b");
+  EXPECT_EQ(report.problems, 0) << LinesOf(report);
+  EXPECT_EQ(TextsIn(Open("b"), on_b), "sign-1=Hello from-b=B");
+  EXPECT_THAT(PushFrom("b").lines, testing::IsEmpty());
+  PullTo("a");
+  EXPECT_EQ(TextsIn(Open("a"), Open("a").FindByName("Hall").key), "sign-1=Hello from-b=B");
+  EXPECT_EQ(Open("a").List().size(), 2u);
+}
+
 TEST_F(HubSync, ACopyOfALibraryIsNotADuplicate) {
   ShareMap("Desk");
   std::filesystem::copy_file(folder_ / "a", folder_ / "copy");
