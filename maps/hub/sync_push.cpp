@@ -18,6 +18,43 @@ void SendAndLink(SyncSession* session, const LocalMap& map, const std::string& i
   session->PutLink(AgreedLink(*session, id, revision, map, local_name));
 }
 
+// Whether a map of the hub was removed here and is to be removed there, where nobody has changed it since.
+bool IsToBeRemoved(const SyncSession& session, const HubHead& head) {
+  const MapLink* link = session.LinkTo(head.id);
+  return session.options().remove && link != nullptr && link->revision > 0 &&
+         link->revision == head.revision && session.local().StampOf(link->key).empty();
+}
+
+// Returns false, and says why, if the hub refuses that.
+bool RemoveFromHub(SyncSession* session, const HubHead& head) {
+  try {
+    session->hub().RemoveMap(head.id, head.revision);
+  } catch (const HubUnreachable&) {
+    throw;
+  } catch (const HubConflict&) {
+    throw;
+  } catch (const Error& error) {
+    session->SayProblem(QuotedName(head.name) + " was not removed from the hub: " + error.what());
+    return false;
+  }
+  session->RemoveLink(session->LinkTo(head.id)->key);
+  session->Say(QuotedName(head.name) + " was removed from the hub");
+  return true;
+}
+
+// Removes a map from the hub whose name another one is to get. That one comes last, when everything that may
+// contain what was removed is on the hub. Returns false if the name stays taken.
+bool FreeNameOnHub(SyncSession* session, const HubHead& taken) {
+  if (session->report().problems > 0)
+    throw Error(
+        "the hub has a map of this name, which was removed here and stays there until every other "
+        "change is saved");
+  const HubHead head = taken;
+  if (!RemoveFromHub(session, head)) return false;
+  session->ReadHeads();
+  return true;
+}
+
 // If the hub has an equal map under this name that is not in the library yet, it is the same one.
 bool AdoptEqualMap(SyncSession* session, const LocalMap& mine, const HubHead& head,
                    const std::string& local_name) {
@@ -36,6 +73,12 @@ bool AdoptEqualMap(SyncSession* session, const LocalMap& mine, const HubHead& he
 void AddToHub(SyncSession* session, const MapInfo& info, MapLink link, std::int64_t base) {
   LocalMap map = session->ReadLocal(info);
   const HubHead* taken = session->HeadNamed(map.facts.info.name);
+  if (taken != nullptr && taken->id != link.id && IsToBeRemoved(*session, *taken)) {
+    if (AdoptEqualMap(session, map, *taken, info.name)) return;
+    session->SendItems(map);  // So that the hub is not long without both.
+    FreeNameOnHub(session, *taken);
+    taken = session->HeadNamed(map.facts.info.name);
+  }
   if (taken != nullptr && taken->id != link.id) {
     if (AdoptEqualMap(session, map, *taken, info.name)) return;
     const std::string name = FreeName(info.name, session->NamesInUse());
@@ -69,9 +112,23 @@ void SaveChanges(SyncSession* session, const MapInfo& info, const MapLink& link,
     session->PutLink(AgreedLink(*session, link.id, head.revision, mine, info.name));
     return;
   }
-  SendAndLink(session, mine, link.id, head.revision, info.name);
+  std::int64_t base = head.revision;
+  const HubHead* taken = session->HeadNamed(mine.facts.info.name);
+  if (taken != nullptr && taken->id != link.id && IsToBeRemoved(*session, *taken)) {
+    // What the other map was joined into is saved before that is removed, and gets its name afterwards.
+    LocalMap unnamed = mine;
+    unnamed.facts.info.name = theirs->facts.info.name;
+    if (!IsSame(unnamed, *theirs)) {
+      base = session->Send(unnamed, link.id, base);
+      MapLink agreed = AgreedLink(*session, link.id, base, unnamed, link.local_name);
+      agreed.stamp.clear();
+      session->PutLink(agreed);
+    }
+    if (!FreeNameOnHub(session, *taken)) return;
+  }
+  SendAndLink(session, mine, link.id, base, info.name);
   session->Say(QuotedName(mine.facts.info.name) + " was saved on the hub as revision " +
-               std::to_string(head.revision + 1));
+               std::to_string(base + 1));
 }
 
 // Merges the map, which both sides have changed, and saves the result on both.
@@ -194,12 +251,8 @@ void PushRemovals(SyncSession* session, bool may_remove) {
                           " was removed here and changed on the hub, where it stays");
     } else {
       try {
-        session->hub().RemoveMap(link.id, link.revision);
-        session->RemoveLink(link.key);
-        session->Say(QuotedName(head->name) + " was removed from the hub");
-      } catch (const HubUnreachable&) {
-        throw;
-      } catch (const Error& error) {
+        RemoveFromHub(session, *head);
+      } catch (const HubConflict& error) {
         session->SayProblem(QuotedName(head->name) + " was not removed from the hub: " + error.what());
       }
     }
@@ -228,6 +281,12 @@ SyncReport Push(const SyncOptions& options) {
   if (!options.remove) {
     for (const std::string& name : options.maps) session.local().library().FindByName(name);
   }
+  std::stable_partition(keys.begin(), keys.end(), [&](std::uint64_t key) {
+    const auto info = std::find_if(infos.begin(), infos.end(),
+                                   [&](const MapInfo& candidate) { return candidate.key == key; });
+    const HubHead* head = session.HeadNamed(info->name);
+    return head == nullptr || !IsToBeRemoved(session, *head);
+  });
   for (const std::uint64_t key : keys) PushWithPatience(&session, key);
   // A map that was not saved may hold what was joined into it from one that was removed here.
   const bool all_saved = session.report().problems == 0;

@@ -299,6 +299,41 @@ TEST_F(HubSync, AMapIsRemovedOnBothSidesOnlyIfThatIsAskedFor) {
   EXPECT_EQ(NamesIn(Open("b")), "");
 }
 
+TEST_F(HubSync, AMapGetsTheNameOfOneThatIsRemovedByTheSamePush) {
+  ShareMap("Desk");
+  {
+    Library a = Open("a");
+    AddSampleMap(&a, "Shelf", 9);
+  }
+  PushFrom("a");
+  PullTo("b");
+  {
+    Library a = Open("a");
+    a.Remove(a.FindByName("Desk").key);
+    AddSampleMap(&a, "Desk", 8);  // Built anew.
+  }
+  SyncOptions options = SampleSync(Url(), folder_ / "a");
+  options.remove = true;
+  SyncReport report = Push(options);
+  EXPECT_EQ(report.problems, 0) << LinesOf(report);
+  PullTo("b");
+  EXPECT_EQ(NamesIn(Open("a")), "Desk,Shelf");
+  EXPECT_EQ(NamesIn(Open("b")), "Desk,Shelf");
+  EXPECT_EQ(DifferenceOf("Desk", folder_ / "a", folder_ / "b"), "");
+  {
+    Library a = Open("a");
+    a.Remove(a.FindByName("Desk").key);
+    ExtendMap(&a, a.FindByName("Shelf").key, {0.1, 0, 0}, 51);
+    a.Rename(a.FindByName("Shelf").key, "Desk");
+  }
+  report = Push(options);
+  EXPECT_EQ(report.problems, 0) << LinesOf(report);
+  EXPECT_THAT(Push(options).lines, testing::IsEmpty());
+  PullTo("b");
+  EXPECT_EQ(NamesIn(Open("a")), "Desk");
+  EXPECT_EQ(DifferenceOf("Desk", folder_ / "a", folder_ / "b"), "");
+}
+
 TEST_F(HubSync, AMapThatWasJoinedStaysOnTheHubUntilTheJoinedMapIsSaved) {
   {
     Library a = Open("a");
