@@ -56,6 +56,7 @@ void AddAuthorCommand(CLI::App* program, Invocation* invocation,
     if (options->target) inputs.push_back({"--target", *options->target});
     CheckOutputFiles(outputs, inputs);
     options->hub = HubOfSession(options->hub, *invocation);
+    options->library_is_copy = invocation->hub_library.has_value();
     if (options->target.has_value() != (options->target_width_m > 0))
       throw CLI::ValidationError("--target", "--target and --target-width must be given together");
     if (!(options->ui_scale >= 0.5 && options->ui_scale <= 4))

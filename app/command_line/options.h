@@ -67,6 +67,7 @@ struct AuthorOptions {
   std::optional<WhenLost> when_lost;  // Empty: kWait with a window, which offers a choice, else kNew.
   double ui_scale = 1;                // Of the window's panel and texts, times what the monitor suggests.
   std::string hub;                    // Address of the hub that gets what is saved; empty for none.
+  bool library_is_copy = false;       // Of the hub, so that what is removed from it is removed there too.
 };
 
 struct TourOptions {

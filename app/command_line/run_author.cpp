@@ -85,6 +85,7 @@ maps::SyncOptions FollowedHub(const TourOptions& options) {
 // the session lasts.
 maps::SyncOptions PulledHub(const AuthorOptions& options) {
   maps::SyncOptions hub = SyncOptionsOf(options.hub, options.library);
+  hub.remove = options.library_is_copy;
   try {
     for (const std::string& line : maps::Pull(hub).lines) spdlog::info("{}", line);
   } catch (const maps::HubUnreachable& unreachable) {

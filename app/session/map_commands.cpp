@@ -64,6 +64,7 @@ void MapCommands::ChangePolicy(const SetPolicy& command, std::uint64_t key, Time
     if (map.NeedsSave())
       throw Error("the map '" + map.name + "' could not be saved, so its policy was not changed");
     library_->SetPolicy(key, command.policy);
+    saving_.LibraryWasChanged();
     map.bounds = library_->Find(key).bounds;
   } else if (command.policy != maps::Policy::kBounded) {
     map.bounds.reset();
@@ -84,7 +85,10 @@ void MapCommands::Apply(const RenameMap& command, const engine::TrackedFrame& fr
   const bool stored = saving_.FlushToLibrary(map->key, command.name, frame.frame.time, lock);
   if (state_.FindByName(command.new_name) != nullptr)
     throw Error("there is already a map '" + command.new_name + "'");
-  if (stored) library_->Rename(map->key, command.new_name);
+  if (stored) {
+    library_->Rename(map->key, command.new_name);
+    saving_.LibraryWasChanged();
+  }
   map->name = command.new_name;
   state_.Retarget(map->key, command.name, map->key, command.new_name);
 }
@@ -98,7 +102,10 @@ void MapCommands::Apply(const RemoveMap& command, const engine::TrackedFrame& fr
   }
   // The library may still have the maps that were joined into it.
   if (!map->joined_keys.empty()) saving_.SaveMap(map, frame.frame.time);
-  if (saving_.FlushToLibrary(map->key, command.name, frame.frame.time, lock)) library_->Remove(map->key);
+  if (saving_.FlushToLibrary(map->key, command.name, frame.frame.time, lock)) {
+    library_->Remove(map->key);
+    saving_.LibraryWasChanged();
+  }
   map->Discard();  // before the cameras leave the map, so that it is not saved again
   system_.RemoveMap(map->key);
   state_.Retarget(map->key, command.name, 0, "");

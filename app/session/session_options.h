@@ -24,7 +24,8 @@ struct SessionOptions : engine::SystemOptions {
   std::string first_map;  // a map of this name is started without a command; empty: wait for `map new`
   // In image time. A map is also saved when it is left and at the end; 0 saves only then.
   Timestamp autosave_interval = std::chrono::seconds(10);
-  // Called on the saver's thread each time that something is on disk. May be empty.
+  // Called each time that something is on disk, on the saver's thread or that of a command, which may hold
+  // the session's mutex. May be empty.
   std::function<void()> on_saved;
   // Idle maps in memory are adjusted while there is nothing else to do; needs `threaded`.
   bool maintenance = true;

@@ -46,6 +46,11 @@ class SessionSaving {
   void Start();
   bool HasStarted() const { return saver_.has_value(); }
 
+  // What the session has changed in the library without a save is on disk.
+  void LibraryWasChanged() {
+    if (options_.on_saved) options_.on_saved();
+  }
+
   void SaveMap(SessionMap* map, Timestamp time);
   void SaveAll(Timestamp time);
   // Saves all maps that are not provisional if the interval of the options has passed. Before that, and now

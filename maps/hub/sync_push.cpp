@@ -210,6 +210,8 @@ void PushMap(SyncSession* session, const MapInfo& info) {
 void PushWithPatience(SyncSession* session, std::uint64_t key) {
   std::string name;
   for (int attempt = 1;; ++attempt) {
+    // A session may have removed it since the push began.
+    if (session->local().StampOf(key).empty()) return;
     try {
       const MapInfo info = session->local().library().Find(key);
       name = info.name;
@@ -231,12 +233,15 @@ void PushWithPatience(SyncSession* session, std::uint64_t key) {
   }
 }
 
-// may_remove: see PushTours.
-void PushRemovals(SyncSession* session, bool may_remove) {
+// before: the maps that the library had when the push began. One of them that is gone since may have been
+// joined into one that was sent as it was before. may_remove: see PushTours.
+void PushRemovals(SyncSession* session, const std::vector<MapInfo>& before, bool may_remove) {
   const std::vector<MapLink> links = session->links();
   for (const MapLink& link : links) {
     const HubHead* head = session->HeadOf(link.id);
     if (link.revision == 0 || head == nullptr || head->removed || !session->local().StampOf(link.key).empty())
+      continue;
+    if (std::any_of(before.begin(), before.end(), [&](const MapInfo& info) { return info.key == link.key; }))
       continue;
     const std::vector<std::string>& wanted = session->options().maps;
     if (!wanted.empty() && std::find(wanted.begin(), wanted.end(), head->name) == wanted.end()) continue;
@@ -290,7 +295,7 @@ SyncReport Push(const SyncOptions& options) {
   for (const std::uint64_t key : keys) PushWithPatience(&session, key);
   // A map that was not saved may hold what was joined into it from one that was removed here.
   const bool all_saved = session.report().problems == 0;
-  PushRemovals(&session, all_saved);
+  PushRemovals(&session, infos, all_saved);
   if (options.maps.empty()) PushTours(&session, all_saved);
   return session.report();
 }

@@ -155,6 +155,16 @@ TEST_F(HubLibrary, IsAuthoredOnOneDeviceAndTouredOnAnother) {
   EXPECT_GT(recognized, 10);
 }
 
+TEST_F(HubLibrary, LosesAMapThatASessionRemoves) {
+  Succeed(Url(), {"maps", "import", Samples()});
+  const std::string script = Path("script.txt");
+  std::ofstream(script) << "0.1 map remove \"Desk\"\n";
+  Succeed(Url(), {"author", "--script", script, "--camera", "sim:room,fps=10", "--until", "1", "--headless",
+                  "--pace", "lockstep", "--when-lost", "wait"});
+  UseDevice("second");
+  EXPECT_THAT(Succeed(Url(), {"maps", "list"}), AllOf(HasSubstr("Shelf"), Not(HasSubstr("Desk"))));
+}
+
 TEST_F(HubLibrary, NamesOneHubOnly) {
   ExpectErrorLine({"tour", "--library", Url(), "--hub", Url("other"), "--camera", "sim:room"}, 2,
                   "--library names a hub already");

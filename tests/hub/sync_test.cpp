@@ -1,6 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <gmock/gmock.h>
 
+#include <algorithm>
+#include <utility>
+
 #include "app/session/library_scene.h"
 #include "maps/hub/administration.h"
 #include "maps/hub/hub.h"
@@ -297,6 +300,30 @@ TEST_F(HubSync, AMapIsRemovedOnBothSidesOnlyIfThatIsAskedFor) {
   EXPECT_THAT(LinesOf(Push(options)), HasSubstr("was removed from the hub"));
   EXPECT_THAT(LinesOf(PullTo("b")), HasSubstr("and so here"));
   EXPECT_EQ(NamesIn(Open("b")), "");
+}
+
+TEST_F(HubSync, AMapThatIsRemovedDuringAPushIsRemovedByTheNext) {
+  ShareMap("Desk");
+  {
+    Library a = Open("a");
+    AddSampleMap(&a, "Shelf", 9);
+  }
+  SyncOptions options = SampleSync(Url(), folder_ / "a");
+  options.remove = true;
+  bool is_removed = false;
+  options.is_stopped = [&] {
+    // The other map is being sent.
+    if (!std::exchange(is_removed, true)) {
+      Library a = Open("a");
+      a.Remove(a.FindByName("Desk").key);
+    }
+    return false;
+  };
+  EXPECT_EQ(Push(options).problems, 0);
+  ASSERT_TRUE(is_removed);
+  const std::vector<HubHead> heads = Hub(Url()).Heads();
+  EXPECT_TRUE(std::none_of(heads.begin(), heads.end(), [](const HubHead& head) { return head.removed; }));
+  EXPECT_THAT(LinesOf(Push(options)), HasSubstr("'Desk' was removed from the hub"));
 }
 
 TEST_F(HubSync, AMapGetsTheNameOfOneThatIsRemovedByTheSamePush) {
