@@ -142,6 +142,7 @@ void RunWithHubLibrary(const HubLibrary& library, const std::function<void()>& r
     throw Error("The folder '" + folder.string() +
                 "' for the copy of the hub cannot be made: " + error.message() + ".");
   if (library.use == LibraryUse::kAuthor) return run();
+  if (library.use == LibraryUse::kCopyOnly && Exists(library.copy)) return run();
   Refresh(library);
   run();
   if (library.use == LibraryUse::kChange) Deliver(library);

@@ -20,7 +20,8 @@ struct Invocation;
 enum class LibraryUse : std::uint8_t {
   kRead,
   kChange,
-  kAuthor,  // An author's session, which exchanges changes with a hub by itself.
+  kAuthor,    // An author's session, which exchanges changes with a hub by itself.
+  kCopyOnly,  // Reads this device's copy of a hub as it is, which may be damaged.
 };
 
 // A library that is given by the address of a hub (docs/hub.md). The command works on the copy of the hub on
@@ -40,9 +41,10 @@ CLI::Option* AddLibraryOption(CLI::App* command, LibraryUse use, std::filesystem
 // CLI::ValidationError if these are two.
 std::string HubOfSession(const std::string& hub, const Invocation& invocation);
 
-// Runs a command on the copy, which gets the hub's changes first; afterwards the hub gets what the command
-// has changed. Without network the command works on the copy as it is, and a warning says so. Throws Error if
-// there is neither a hub nor a copy, or if this user may not change what the command would.
+// Runs a command on the copy, which gets the hub's changes first unless the command is about the copy itself;
+// afterwards the hub gets what the command has changed. Without network the command works on the copy as it
+// is, and a warning says so. Throws Error if there is neither a hub nor a copy, or if this user may not
+// change what the command would.
 void RunWithHubLibrary(const HubLibrary& library, const std::function<void()>& run);
 
 }  // namespace docent::app

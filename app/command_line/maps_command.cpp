@@ -275,7 +275,7 @@ void AddMapsCommand(CLI::App* program, Invocation* invocation) {
                List));
   add_json(add_name(add("show", LibraryUse::kRead, "Show one map",
                         "docent maps show \"Desk 3\" --library museum.docent", Show)));
-  add("verify", LibraryUse::kRead, "Read the whole library and report damage",
+  add("verify", LibraryUse::kCopyOnly, "Read the whole library and report damage",
       "docent maps verify --library museum.docent", Verify);
   add_name(add("rename", LibraryUse::kChange, "Rename a map",
                "docent maps rename \"Desk 3\" Kiosk --library museum.docent", Rename))

@@ -355,7 +355,7 @@ void AddMapsExchangeCommands(CLI::App* group, Invocation* invocation) {
   join->add_option("NAME", options->name, "Name of the map that the other is joined into")->required();
   join->add_option("OTHER", options->other_name, "Name of the map that is joined into it and removed")
       ->required();
-  add("recover", LibraryUse::kRead, "Save the readable parts of a damaged library to a new one",
+  add("recover", LibraryUse::kCopyOnly, "Save the readable parts of a damaged library to a new one",
       "docent maps recover --library damaged.docent --output saved.docent", Recover)
       ->add_option("--output", options->output, "The new library")
       ->required();

@@ -155,6 +155,20 @@ TEST_F(HubLibrary, IsAuthoredOnOneDeviceAndTouredOnAnother) {
   EXPECT_GT(recognized, 10);
 }
 
+TEST_F(HubLibrary, IsRecoveredFromADamagedCopy) {
+  Succeed(Url(), {"maps", "import", Samples()});
+  std::filesystem::path copy;
+  for (const auto& entry : std::filesystem::directory_iterator(folder_ / "first" / "docent" / "hubs")) {
+    if (entry.path().extension() == ".docent") copy = entry.path();
+  }
+  ASSERT_FALSE(copy.empty());
+  constexpr int kCutBytes = 5000;  // More than a page.
+  std::filesystem::resize_file(copy, std::filesystem::file_size(copy) - kCutBytes);
+  EXPECT_EQ(On(Url(), {"maps", "verify"}).exit_status, 1);
+  EXPECT_THAT(Succeed(Url(), {"maps", "recover", "--output", Path("saved.docent")}), HasSubstr("recovered"));
+  EXPECT_FALSE(OpenSampleLibrary(Path("saved.docent")).List().empty());
+}
+
 TEST_F(HubLibrary, LosesAMapThatASessionRemoves) {
   Succeed(Url(), {"maps", "import", Samples()});
   const std::string script = Path("script.txt");
