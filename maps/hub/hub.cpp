@@ -293,6 +293,10 @@ std::vector<HubTour> Hub::Tours() {
       tour.name = rows.Text(i, 0);
       tour.revision = rows.Integer(i, 1);
       tour.language = rows.Text(i, 2);
+      // Tags mean the same in upper case, which a hub takes and a library does not.
+      for (char& c : tour.language) {
+        if (c >= 'A' && c <= 'Z') c = static_cast<char>(c - 'A' + 'a');
+      }
       const std::int64_t minutes = rows.Integer(i, 3);
       const FactsJson stops = FactsJson::parse(rows.Text(i, 4), nullptr, false);
       if (!stops.is_array() || stops.size() > kMaxTourStops || minutes < 0 || minutes > kMaxTourMinutes)

@@ -469,6 +469,21 @@ TEST_F(HubSync, ATourStaysOneTourWhenAMapOfItIsRemovedOnTheHub) {
   }
 }
 
+TEST_F(HubSync, ATourWhoseLanguageIsInCapitalsOnTheHubIsPulled) {
+  {
+    Library a = Open("a");
+    const std::uint64_t desk = AddSampleMap(&a, "Desk", 1);
+    a.ChangeTours([&](std::vector<Tour>* tours) { tours->push_back({"Short", {desk}, "", 20}); });
+  }
+  PushFrom("a");
+  RunHubSql(Url(), "UPDATE docent.tours SET language = 'DE'");  // As another client may have saved it.
+  EXPECT_EQ(PullTo("b").problems, 0);
+  const std::vector<Tour> tours = Open("b").Tours();
+  ASSERT_EQ(tours.size(), 1u);
+  EXPECT_EQ(tours[0].language, "de");
+  EXPECT_THAT(PushFrom("b").lines, testing::IsEmpty());
+}
+
 TEST_F(HubSync, ATourThatIsDamagedHereStaysOnTheHub) {
   {
     Library a = Open("a");
