@@ -275,9 +275,11 @@ class FileToSalvage {
     const std::uintmax_t log = fs::file_size(fs::path(file).concat("-wal"), error);
     if (error || log == 0) return;
     fs::remove(copy_, error);
+    is_made_ = true;
     copied_ = losses->Try("the log of " + file.string(), [&] { Database::OpenDamaged(file).CopyTo(copy_); });
   }
   ~FileToSalvage() {
+    if (!is_made_) return;
     std::error_code error;
     fs::remove(copy_, error);
   }
@@ -287,7 +289,7 @@ class FileToSalvage {
 
  private:
   fs::path file_, copy_;
-  bool copied_ = false;
+  bool is_made_ = false, copied_ = false;
 };
 
 // Signposts to maps that are lost lead nowhere.

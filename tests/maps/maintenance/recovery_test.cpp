@@ -50,6 +50,12 @@ TEST_F(Recovering, AnUndamagedLibraryIsRecoveredCompletely) {
   EXPECT_THAT(ErrorOf([&] { Recover(file_, target_); }), HasSubstr("exists already"));
 }
 
+TEST_F(Recovering, AFileOfOthersBesideTheTargetStays) {
+  WriteWholeFile(folder_ / "b.docent.part", Bytes(10, 'x'));
+  EXPECT_EQ(Recover(file_, target_).maps_complete, 4u);
+  EXPECT_EQ(FilesIn(folder_.path()), "a.docent b.docent b.docent.part");
+}
+
 TEST_F(Recovering, LossesAreNamedAndTheRestIsRecovered) {
   RunSql("DELETE FROM pictures WHERE map_key = 2 AND keyframe = 3");  // One keyframe of six.
   RunSql("UPDATE parts SET data = x'00' WHERE map_key = 3 AND part = 'points'");
