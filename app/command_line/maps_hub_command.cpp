@@ -24,6 +24,8 @@ using MapsHubAction = maps::SyncReport (*)(const maps::SyncOptions& options);
 void Exchange(MapsHubOptions options, MapsHubAction action, Verbosity verbosity) {
   const Interruption interruption;
   options.sync.bytes_per_second = static_cast<std::int64_t>(1000 * options.limit_kB_per_s);
+  // A limit below a byte per second is no permission for any rate.
+  if (options.limit_kB_per_s > 0 && options.sync.bytes_per_second == 0) options.sync.bytes_per_second = 1;
   options.sync.is_stopped = [] { return Interruption::requested(); };
   const maps::SyncReport report = action(options.sync);
   if (verbosity != Verbosity::kQuiet || report.problems > 0) {
