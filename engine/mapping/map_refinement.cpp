@@ -2,9 +2,11 @@
 #include "engine/mapping/map_refinement.h"
 
 #include <algorithm>
+#include <set>
 #include <utility>
 
 #include "engine/map/map_readout.h"
+#include "engine/mapping/bundle/map_assembly.h"
 #include "engine/mapping/calibration/readout_calibration.h"
 
 namespace docent::engine {
@@ -17,11 +19,17 @@ void MapRefinement::Reset() {
 }
 
 void MapRefinement::Forget() {
+  to_adjust_.clear();
   to_match_.clear();
   keyframes_since_global_ = 0;
 }
 
 void MapRefinement::AddKeyFrame(KeyFrameId keyframe) {
+  to_adjust_.push_back(keyframe);
+  AddLocalized(keyframe);
+}
+
+void MapRefinement::AddLocalized(KeyFrameId keyframe) {
   newest_ = keyframe;
   ++keyframes_since_global_;
   locally_adjusted_ = false;
@@ -37,22 +45,32 @@ bool MapRefinement::NeedsGlobalAdjustment() const {
 
 void MapRefinement::MatchNewPoints() {
   constexpr std::size_t kNeighbours = 8;
-  if (newest_ != kNoId) {
-    auto neighbours = workspace_->map.Covisible(newest_);
+  std::vector<KeyFrameId> sources = to_adjust_;
+  if (sources.empty() && newest_ != kNoId) sources.push_back(newest_);
+  std::set<KeyFrameId> searched;
+  for (const KeyFrameId source : sources) {
+    auto neighbours = workspace_->map.Covisible(source);
     if (neighbours.size() > kNeighbours) neighbours.resize(kNeighbours);
-    for (const auto& [id, shared] : neighbours)
-      MatchMapPoints(options_.guided_matching, id, &workspace_->searcher, &workspace_->map, &to_match_);
+    for (const auto& [id, shared] : neighbours) {
+      if (searched.insert(id).second)
+        MatchMapPoints(options_.guided_matching, id, &workspace_->searcher, &workspace_->map, &to_match_);
+    }
   }
   to_match_.clear();
 }
 
 void MapRefinement::AdjustAroundNewest() {
-  const BundleSummary summary = AdjustLocally(options_.adjustment, newest_, interrupt_, &workspace_->map);
+  Map& map = workspace_->map;
+  const KeyFrameId keyframe = NewestToAdjust();
+  // The adjustment removes observations, on which the window depends.
+  const std::set<KeyFrameId> adjusted = KeyFramesAround(options_.adjustment.window, keyframe, &map);
+  const BundleSummary summary = AdjustLocally(options_.adjustment, keyframe, interrupt_, &map);
   if (summary.outcome != BundleSummary::Outcome::kInterrupted) {
-    locally_adjusted_ = true;
-    AdjustToReadout();
+    std::erase_if(to_adjust_, [&](KeyFrameId waiting) { return adjusted.contains(waiting); });
+    locally_adjusted_ = to_adjust_.empty();
+    AdjustToReadout(keyframe);
   }
-  output_->Publish(workspace_->map.Snapshot());
+  output_->Publish(map.Snapshot());
 }
 
 std::vector<MapRefinement::KnownReadout>::iterator MapRefinement::FindKnownReadout(const CameraModel& lens) {
@@ -67,9 +85,9 @@ void MapRefinement::SetReadoutPrior(const std::optional<ReadoutPrior>& prior,
   if (prior) known_readouts_.push_back({std::move(lens), *prior});
 }
 
-bool MapRefinement::AdjustToReadout() {
-  if (!UpdateReadout()) return false;
-  AdjustLocally(options_.adjustment, newest_, interrupt_, &workspace_->map);
+bool MapRefinement::AdjustToReadout(KeyFrameId keyframe) {
+  if (!UpdateReadoutOf(keyframe)) return false;
+  AdjustLocally(options_.adjustment, keyframe, interrupt_, &workspace_->map);
   RequireGlobalAdjustment();
   return true;
 }
@@ -81,17 +99,18 @@ void MapRefinement::EstimateReadout(const TrackedCorners& corners) {
   const auto prior = estimate ? SignificantReadout(options_.track_readout, *estimate) : std::nullopt;
   if (!prior) return;
   SetReadoutPrior(prior, corners.camera);
-  if (AdjustToReadout()) output_->Publish(workspace_->map.Snapshot());
+  if (AdjustToReadout(newest_)) output_->Publish(workspace_->map.Snapshot());
 }
 
-bool MapRefinement::UpdateReadout() {
-  const Map::KeyFrameRecord* newest = workspace_->map.FindKeyFrame(newest_);
-  if (!MayEstimateReadout() || !newest) return false;
-  const std::shared_ptr<const CameraModel> camera = newest->keyframe.camera;
+bool MapRefinement::UpdateReadoutOf(KeyFrameId keyframe) {
+  const Map::KeyFrameRecord* record = workspace_->map.FindKeyFrame(keyframe);
+  if (!MayEstimateReadout() || !record) return false;
+  const std::shared_ptr<const CameraModel> camera = record->keyframe.camera;
   ReadoutEstimationOptions options = options_.readout;
   const auto known = FindKnownReadout(*camera);
   if (known != known_readouts_.end()) options.prior = known->prior;
-  const ReadoutCalibration result = CalibrateReadout(options, options_.adjustment, newest_, &workspace_->map);
+  const ReadoutCalibration result =
+      CalibrateReadout(options, options_.adjustment, keyframe, &workspace_->map);
   // Without the corners, it may be an error of the calibration that the next keyframes reveal.
   if (result.estimate && options.prior) SetReadoutPrior(result.estimate, camera);
   return result.changed;

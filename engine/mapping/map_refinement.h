@@ -35,8 +35,10 @@ class MapRefinement {
   void Forget();
   // The keyframe about which the next local tasks are done; kNoId for none.
   void SetNewest(KeyFrameId keyframe) { newest_ = keyframe; }
-  // A keyframe with a known position was added.
+  // A keyframe with a known position was added. It waits for its local adjustment, even if others follow.
   void AddKeyFrame(KeyFrameId keyframe);
+  // A panorama keyframe was localized. It waits for its local adjustment until a keyframe is added.
+  void AddLocalized(KeyFrameId keyframe);
   // New points, to be searched in earlier keyframes.
   void AddPoints(std::span<const MapPointId> points);
   void SetLocallyAdjusted() { locally_adjusted_ = true; }
@@ -45,14 +47,17 @@ class MapRefinement {
   // The same, with the loss for the remaining error of a loop.
   void RequireAdjustmentOfLoop() { global_due_ = loop_to_adjust_ = true; }
 
-  // True unless a new keyframe waits for its local adjustment. From any thread.
+  // True unless keyframes wait for their local adjustment. From any thread.
   bool IsLocallyAdjusted() const { return locally_adjusted_; }
   bool HasNewPoints() const { return !to_match_.empty(); }
   bool NeedsGlobalAdjustment() const;
   bool MayHaveRedundantKeyFrames() const { return culling_due_; }
 
-  // Searches the new points in the keyframes that share most points with the newest one.
+  // Searches the new points in the keyframes that share most points with those that wait for their local
+  // adjustment, or with the newest one.
   void MatchNewPoints();
+  // Adjusts the newest of the waiting keyframes and those around it. The others in this window wait no
+  // longer.
   void AdjustAroundNewest();
   // The readout time of a lens that was estimated from the corners of the initialization.
   void SetReadoutPrior(const std::optional<ReadoutPrior>& prior, std::shared_ptr<const CameraModel> lens);
@@ -60,7 +65,7 @@ class MapRefinement {
   void EstimateReadout(const TrackedCorners& corners);
   // Estimates the readout time of the newest keyframe's camera. True if it changed, so that the map has to be
   // adjusted.
-  bool UpdateReadout();
+  bool UpdateReadout() { return UpdateReadoutOf(newest_); }
   void AdjustWholeMap();
   // Removes one redundant keyframe if there is one.
   void CullRedundantKeyFrame();
@@ -75,13 +80,17 @@ class MapRefinement {
   // Whether the readout time may be estimated: the errors of a calibration that is not known yet look alike.
   bool MayEstimateReadout() const { return !options_.temporary && options_.lens.lenses.empty(); }
   std::vector<KnownReadout>::iterator FindKnownReadout(const CameraModel& lens);
-  // Estimates the readout time and adjusts the map again if it changed, which is returned.
-  bool AdjustToReadout();
+  KeyFrameId NewestToAdjust() const { return to_adjust_.empty() ? newest_ : to_adjust_.back(); }
+  bool UpdateReadoutOf(KeyFrameId keyframe);
+  // Estimates the readout time and adjusts the map around this keyframe again if it changed, which is
+  // returned.
+  bool AdjustToReadout(KeyFrameId keyframe);
   const MapperOptions& options_;
   const std::atomic<bool>* const interrupt_;
   MapWorkspace* const workspace_;
   MapperOutput* const output_;
   KeyFrameId newest_ = kNoId;
+  std::vector<KeyFrameId> to_adjust_;  // added and not adjusted locally yet, the newest last
   std::vector<KnownReadout> known_readouts_;
   std::vector<MapPointId> to_match_;
   std::atomic<bool> locally_adjusted_{true};

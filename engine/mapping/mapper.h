@@ -39,7 +39,7 @@ class Mapper {
 
   // Does the most urgent task; false if there was none.
   bool Step();
-  // True if nothing urgent waits: no keyframe is queued, and the newest one is adjusted.
+  // True if nothing urgent waits: no keyframe is queued, and those that were added are adjusted locally.
   bool IsIdle() const { return QueueLength() == 0 && refinement_.IsLocallyAdjusted(); }
 
   // The last published state; null while there is no map.

@@ -98,7 +98,7 @@ bool PanoramaMapper::Localize(KeyFrameId id, const Rigid3* guess) {
   if (!LocalizePanoramaKeyFrame(options_.localization, id, id + 1, &map, &workspace_->searcher, guess))
     return false;
   PlanConversions(id);
-  refinement_->AddKeyFrame(id);
+  refinement_->AddLocalized(id);
   loops_->Enqueue(id);
   output_->Publish(map.Snapshot());
   output_->AddEvent(map.FindKeyFrame(id)->keyframe.time,

@@ -65,12 +65,17 @@ std::vector<MapPointId> FinitePointsSeenBy(Map* map, const std::set<KeyFrameId>&
 
 }  // namespace
 
-MapAssembly AssembleAround(int window, int max_fixed, KeyFrameId keyframe, Map* map) {
-  std::set<KeyFrameId> free = {keyframe};
+std::set<KeyFrameId> KeyFramesAround(int window, KeyFrameId keyframe, Map* map) {
+  std::set<KeyFrameId> keyframes = {keyframe};
   for (const auto& [id, shared] : map->Covisible(keyframe)) {
-    if (static_cast<int>(free.size()) > window) break;
-    free.insert(id);
+    if (static_cast<int>(keyframes.size()) > window) break;
+    keyframes.insert(id);
   }
+  return keyframes;
+}
+
+MapAssembly AssembleAround(int window, int max_fixed, KeyFrameId keyframe, Map* map) {
+  const std::set<KeyFrameId> free = KeyFramesAround(window, keyframe, map);
   std::vector<MapPointId> points = FinitePointsSeenBy(map, free);
   std::map<KeyFrameId, int> others;
   for (const MapPointId id : points) {

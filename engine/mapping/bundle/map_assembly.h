@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <set>
 #include <vector>
 
 #include "engine/map/map.h"
@@ -15,6 +16,8 @@ struct MapAssembly {
   std::vector<MapPointId> points;
 };
 
+// `keyframe` and the `window` keyframes that share most points with it.
+std::set<KeyFrameId> KeyFramesAround(int window, KeyFrameId keyframe, Map* map);
 // `keyframe`, the `window` keyframes that share most points with it, and all their points; the other
 // observers of these points, at most `max_fixed`, are fixed (ptamm §2.3). The keyframe must exist.
 MapAssembly AssembleAround(int window, int max_fixed, KeyFrameId keyframe, Map* map);

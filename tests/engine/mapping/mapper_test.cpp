@@ -279,6 +279,25 @@ TEST_F(MapperTest, InsertsAQueuedKeyframeBeforeItAdjusts) {
   EXPECT_TRUE(mapper.IsIdle());
 }
 
+// As the keyframes of two cameras that look in different directions.
+TEST_F(MapperTest, AdjustsAKeyframeAlthoughOneThatSharesNothingWithItFollows) {
+  const Eigen::Vector3d center(0.25, 0, 0);
+  KeyFrameCandidate moved = TrueCandidate(*world_, *started_, CameraAt(center), 1);
+  moved.camera_from_map = CameraAt(center + Eigen::Vector3d(0, 0.02, 0));
+  KeyFrameCandidate elsewhere = TrueCandidate(*world_, *started_, CameraAt(center, {0, 180, 0}), 2);
+  elsewhere.matches.clear();
+  Mapper mapper({});
+  mapper.Adopt(started_);
+  ASSERT_TRUE(mapper.Offer(moved));
+  ASSERT_TRUE(mapper.Offer(elsewhere));
+  WorkUntilIdle(&mapper);
+  EXPECT_TRUE(mapper.IsIdle());
+  EXPECT_EQ(CountEvents<MapperEvent::GloballyAdjusted>(&mapper), 0);
+  const MapSnapshot& map = *mapper.Snapshot();
+  ASSERT_EQ(map.keyframes.size(), 4u);
+  EXPECT_LT((map.keyframes[2].camera_from_map.OriginInSource() - center).norm(), 0.008);
+}
+
 TEST_F(MapperTest, KeepsTheMapValidWhileKeyframesInterruptIt) {
   Mapper mapper({});
   mapper.Adopt(started_);
