@@ -60,7 +60,7 @@ void MapPolicy::Disconnect(std::size_t index) {
   state_.association.SetLost(index);
   const KnownMap* const map = state_.FindMap(gone.assignment.map());
   if (!gone.assignment.started_map() || map == nullptr || !map->Exists() || map->snapshot) return;
-  // Until the map has a pose, no camera may search another one: one with images must start it.
+  // Until the map has a pose, it may be the only one that a camera searches: one with images must start it.
   for (SystemCamera& other : state_.cameras) {
     if (!other.is_connected || other.assignment.map() != map->key) continue;
     other.assignment.Start(map->key, map->after_loss);
@@ -152,8 +152,9 @@ void MapPolicy::Discard(std::size_t index, Timestamp time, MapDiscarded event) {
   event.replacement = next.key;
   state_.Emit(time, key, event);
   AssignMapper(next.key, nullptr);
-  state_.association.Begin(next.key);
-  // Until the next map has a pose, no camera may search another one: a camera with images must start it.
+  BeginTracking(next.key, next.after_loss);
+  // Until the next map has a pose, it may be the only one that a camera searches: a camera with images must
+  // start it.
   const auto is_starter = [key](const SystemCamera& camera) {
     return camera.is_connected && camera.assignment.map() == key && camera.assignment.started_map();
   };
@@ -210,7 +211,16 @@ void MapPolicy::StartMap(std::uint64_t key, std::size_t camera, bool after_loss)
       state_.cameras[i].assignment.WaitFor(key);
     }
   }
-  state_.association.Begin(key);
+  BeginTracking(key, after_loss);
+}
+
+// A single camera searches the initial views itself, and the known maps from the first pose on.
+void MapPolicy::BeginTracking(std::uint64_t key, bool after_loss) {
+  if (after_loss && state_.cameras.size() > 1) {
+    state_.association.Release();
+  } else {
+    state_.association.Begin(key);
+  }
 }
 
 void MapPolicy::EnterMap(std::uint64_t key, std::size_t camera) {

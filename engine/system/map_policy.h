@@ -55,6 +55,8 @@ class MapPolicy {
   void LeavePreviousMap(std::uint64_t previous, std::uint64_t entered, Timestamp time);
   // Discards the map of this camera, and starts another one instead.
   void Discard(std::size_t index, Timestamp time, MapDiscarded event);
+  // No camera is tracked in the new map yet. Those that wait for it may search the known maps after a loss.
+  void BeginTracking(std::uint64_t key, bool after_loss);
   void AssignMapper(std::uint64_t key, std::shared_ptr<const MapSnapshot> snapshot);
   void SearchInitialViewsAgain();
   std::uint64_t NewKey() const;  // 0 if there is none now

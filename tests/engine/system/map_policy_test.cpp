@@ -190,6 +190,40 @@ TEST_F(PolicyForTwoCameras, StartsOneMapAfterALossWhileTheOtherCameraProcessesAF
   EXPECT_EQ(state_.active_key, 2u);
 }
 
+TEST_F(PolicyForTwoCameras, LetsTheCameraThatWaitsForAMapAfterALossReturnToTheKnownOne) {
+  options_.new_map_when_lost = true;
+  LoseMapWithAPoint(2);
+  Lose(0, 2.25);
+  ASSERT_EQ(state_.active_key, 2u);
+  for (const std::size_t camera : {0, 1}) NextOrder(camera);
+  EXPECT_EQ(state_.association.SearchedMap(1), 0u);
+  Handle(0, 2.4, TrackingState::kInitializing);
+  EXPECT_EQ(Handle(1, 2.4, TrackingState::kRelocalized, 1).state, TrackingState::kRelocalized);
+  EXPECT_EQ(Assignment(1).map(), 1u);
+  EXPECT_EQ(Assignment(0).map(), 1u);
+  EXPECT_TRUE(MapOf(2).discarded);
+  EXPECT_EQ(state_.active_key, 1u);
+}
+
+TEST_F(PolicyForTwoCameras, SearchesTheKnownMapsWhileAMapAfterALossIsReplaced) {
+  options_.new_map_when_lost = true;
+  LoseMapWithAPoint(2);
+  Lose(0, 2.25);
+  for (const std::size_t camera : {0, 1}) NextOrder(camera);
+  MapOf(2).SetSnapshot(MapWithoutDepth());
+  Handle(0, 2.3, TrackingState::kPanorama, 2);
+  Lose(0, 2.4);
+  Lose(0, 2.6);
+  ASSERT_TRUE(MapOf(2).discarded);
+  EXPECT_EQ(state_.association.SearchedMap(1), 0u);
+}
+
+TEST_F(PolicyForTwoCameras, SearchesNoKnownMapWhileAMapBeginsThatAPersonAskedFor) {
+  LoseMapWithAPoint(2);
+  policy_.StartMap(5, 0, false);
+  EXPECT_EQ(state_.association.SearchedMap(1), 5u);
+}
+
 TEST_F(PolicyForTwoCameras, KeepsAMapThatWasOrderedWhileTheCameraLeftTheLastOne) {
   options_.new_map_when_lost = true;
   LoseMapWithAPoint(2);
