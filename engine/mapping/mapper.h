@@ -24,6 +24,8 @@ class Mapper {
   // Continues with a map of the library, or with an empty map (null). Discards the queue. Must not be called
   // during a Step().
   void Adopt(std::shared_ptr<const MapSnapshot> snapshot);
+  // Another map is about to be adopted: ends a long adjustment of the current one early. From any thread.
+  void Interrupt() { queue_.Interrupt(); }
   // Joins another map with the current one if both show one place (map_joining.h). The current map keeps its
   // ids and coordinates, and the queue remains. Nothing changes if the result has no `joined` map. Takes
   // seconds; must not be called during a Step(). interrupt may be null.

@@ -35,6 +35,8 @@ class MapperQueue {
   std::size_t Length() const;
   // Drops all requests and reports.
   void Clear();
+  // Interrupts an adjustment in progress, whose result is not needed any more.
+  void Interrupt() { interrupt_ = true; }
 
   // The next request if one waits. Work lasts until EndWork.
   std::optional<Request> BeginStep();
@@ -43,7 +45,7 @@ class MapperQueue {
   // Returns the seconds by which the work delayed a request that was offered meanwhile; 0 if none was.
   double EndWork();
 
-  // True while a request waits that was offered since the last BeginStep.
+  // True while a request waits, and from Interrupt to the next BeginStep.
   const std::atomic<bool>* interrupt() const { return &interrupt_; }
 
  private:

@@ -56,6 +56,7 @@ std::uint64_t MappingThread::Adopt(std::uint64_t key, std::shared_ptr<const MapS
     interrupt_join_ = true;
     starting_ = false;
     has_work_ = true;
+    mapper_.Interrupt();
   }
   changed_.notify_all();
   if (!worker_) ApplyAdoption();

@@ -45,6 +45,17 @@ TEST(MapperQueue, InterruptsWorkWhileARequestWaits) {
   EXPECT_TRUE(*queue.interrupt());
 }
 
+TEST(MapperQueue, InterruptsAStepUntilTheNextOne) {
+  MapperQueue queue(3);
+  queue.BeginStep();
+  EXPECT_FALSE(*queue.interrupt());
+  queue.Interrupt();
+  EXPECT_TRUE(*queue.interrupt());
+  queue.EndWork();
+  queue.BeginStep();
+  EXPECT_FALSE(*queue.interrupt());
+}
+
 TEST(MapperQueue, MeasuresHowLongWorkDelaysARequest) {
   constexpr auto kWork = std::chrono::milliseconds(20);
   MapperQueue queue(3);
