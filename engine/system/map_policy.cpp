@@ -179,13 +179,17 @@ void MapPolicy::HandleMapperEvent(const MapperEvent& event, KnownMap* map) {
   if (std::holds_alternative<MapperEvent::MapStarted>(event.what)) {
     map->provisional.Begin(event.time);
     for (std::size_t i = 0; i < state_.cameras.size(); ++i) {
-      const MapAssignment& assignment = state_.cameras[i].assignment;
-      if (assignment.map() == map->key && assignment.is_starting())
-        state_.association.SetTracked(i, map->key);
+      const SystemCamera& camera = state_.cameras[i];
+      if (camera.assignment.map() != map->key || !camera.assignment.is_starting()) continue;
+      state_.association.SetTracked(i, map->key);
+      // Without images it would count as tracked for ever. The map has begun nevertheless.
+      if (!camera.is_connected) state_.association.SetLost(i);
     }
   } else if (std::holds_alternative<MapperEvent::StartFailed>(event.what)) {
     for (SystemCamera& camera : state_.cameras) {
-      if (camera.assignment.map() == map->key)
+      // Another camera may have been told to start the map instead of one that was disconnected.
+      const bool replaced = !camera.is_connected && camera.assignment.has_order();
+      if (camera.assignment.map() == map->key && !replaced)
         camera.assignment.FailStart(map->snapshot != nullptr, map->after_loss);
     }
   }

@@ -148,6 +148,33 @@ TEST_F(PolicyForTwoCameras, LeavesAMapThatADisconnectedCameraHasStarted) {
   EXPECT_EQ(NextOrder(1), Order::kNone);
 }
 
+TEST_F(PolicyForTwoCameras, DoesNotCountADisconnectedCameraAsTrackedInTheMapThatItStarted) {
+  policy_.StartMap(1, 0, false);
+  for (const std::size_t camera : {0, 1}) NextOrder(camera);
+  MapOf(1).SetSnapshot(MapWithoutDepth());
+  policy_.Disconnect(0);
+  policy_.HandleMapperEvent({FromSeconds(1), MapperEvent::MapStarted{}}, &MapOf(1));
+  EXPECT_FALSE(state_.association.IsTracked(0));
+  EXPECT_EQ(state_.association.SearchedMap(), 0u) << "the map has begun";
+}
+
+TEST_F(PolicyForTwoCameras, DoesNotLetADisconnectedCameraStartAMapThatTheOtherOneStarts) {
+  policy_.StartMap(1, 0, false);
+  for (const std::size_t camera : {0, 1}) NextOrder(camera);
+  policy_.Disconnect(0);  // It has given an initial pair.
+  policy_.HandleMapperEvent({FromSeconds(1), MapperEvent::StartFailed{}}, &MapOf(1));
+  EXPECT_EQ(NextOrder(0), Order::kEnter);
+  EXPECT_EQ(NextOrder(1), Order::kStart);
+}
+
+TEST_F(PolicyForTwoCameras, LetsACameraThatReturnsStartTheMapThatNobodyElseStarts) {
+  policy_.StartMap(1, 0, false);
+  for (const std::size_t camera : {0, 1}) NextOrder(camera);
+  for (const std::size_t camera : {1, 0}) policy_.Disconnect(camera);
+  policy_.HandleMapperEvent({FromSeconds(1), MapperEvent::StartFailed{}}, &MapOf(1));
+  EXPECT_EQ(NextOrder(0), Order::kStart);
+}
+
 TEST_F(PolicyForTwoCameras, KeepsAMapWithoutDepthThatNoCameraStarted) {
   EnterMapWithoutDepth(1);
   for (const double seconds : {2.0, 2.2, 9.0}) Lose(0, seconds);
