@@ -29,13 +29,16 @@ std::vector<LoopCandidate> LoopDetector::Detect(KeyFrameId id, Map* map, PointSe
   const Map::KeyFrameRecord* record = map->FindKeyFrame(id);
   if (!record || record->keyframe.kind != KeyFrameKind::kSixDof) return {};
   const std::optional<LoopCandidate> candidate = FindCandidate(id, map, searcher);
-  if (!candidate) {
-    candidates_.clear();
-    return {};
-  }
   std::erase_if(candidates_, [&](const LoopCandidate& earlier) {
     return !map->FindKeyFrame(earlier.keyframe) || !map->FindKeyFrame(earlier.place);
   });
+  if (!candidate) {
+    // Another camera looks elsewhere and says nothing of the place.
+    if (!candidates_.empty() && map->FindKeyFrame(candidates_.back().keyframe)
+                                    ->keyframe.camera->HasSameLens(*record->keyframe.camera))
+      candidates_.clear();
+    return {};
+  }
   if (!candidates_.empty() && !Agree(candidates_.back(), *candidate, map)) candidates_.clear();
   // Small disagreements of neighbours add up, or the first candidate was wrong: the series starts later then.
   candidates_.erase(candidates_.begin(), std::ranges::find_if(candidates_, [&](const LoopCandidate& earlier) {

@@ -52,7 +52,8 @@ class LoopDetector {
 
   const LoopDetectorOptions options_;
   LoopCandidateSearch search_;
-  // Of keyframes in a row; each agrees with the one before it, and the first one with the last.
+  // Of keyframes in a row, apart from those of another camera that show nothing known; each agrees with the
+  // one before it, and the first one with the last.
   std::vector<LoopCandidate> candidates_;
 };
 

@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <memory>
 #include <vector>
 
 #include "tests/engine/mapping/loops/there_and_back.h"
@@ -75,6 +76,22 @@ TEST(LoopDetector, StartsAnewAfterAKeyframeThatShowsNothingKnown) {
   constexpr KeyFrameId kElsewhere = 17;
   EXPECT_EQ(LoopsOf({14, 15, kElsewhere, 16}, &map), Loops{});
   EXPECT_EQ(LoopsOf({14, 15, kElsewhere, 16, 15, 14}, &map), (Loops{{16, 15, 14}}));
+}
+
+// The keyframes of all cameras are examined in the order in which they come.
+TEST(LoopDetector, GoesOnAfterAKeyframeOfAnotherCameraThatShowsNothingKnown) {
+  const std::vector<double> somewhere = {0.3};
+  const auto elsewhere = MapOfPlaces(Gallery({21, 22}, {31, 32}), somewhere);
+  Map map = MapOfStretches(
+      std::vector<Stretch>{{WayOut(), {}}, {WayBack(), SmallDrift()}, {elsewhere, SmallDrift(), false}});
+  constexpr KeyFrameId kElsewhere = 17;
+  KeyFrame& keyframe = map.FindKeyFrame(kElsewhere)->keyframe;
+  CameraModel::Intrinsics intrinsics = keyframe.camera->intrinsics();
+  intrinsics.fx += 1;
+  keyframe.camera =
+      std::make_shared<const CameraModel>(keyframe.camera->lens(), intrinsics, keyframe.camera->distortion());
+  EXPECT_EQ(LoopsOf({14, 15, kElsewhere, 16}, &map), Loops{kInOrder});
+  EXPECT_EQ(LoopsOf({14, kElsewhere, kElsewhere, 15}, &map), Loops{}) << "it does not count";
 }
 
 TEST(LoopDetector, ForgetsItsCandidatesWhenItIsCleared) {
