@@ -87,6 +87,8 @@ class OverlapFinder {
   std::vector<std::size_t> BySupport() const;
   bool Confirms(const OverlapEvidence& evidence, const LoopCandidate& candidate) const;
   std::size_t LongestSeries(const Sim3& a_from_b) const;
+  std::size_t LongestSeries(const std::set<std::size_t>& agreeing,
+                            const std::vector<std::size_t>& orders) const;
   bool IsOtherViewpoint(const KeyFrame& a, const KeyFrame& b) const;
   // The difference of two similarities at a keyframe of B, in the coordinates of B.
   double Difference(const Sim3& a_from_b, const Sim3& other_a_from_b, const KeyFrame& keyframe) const {
@@ -173,7 +175,24 @@ bool OverlapFinder::IsOtherViewpoint(const KeyFrame& a, const KeyFrame& b) const
   return shift > options_.min_viewpoint_step * b.mean_depth || rotation > options_.min_viewpoint_step;
 }
 
-// The largest number of consecutive keyframes of B that were recognized in agreement with the similarity.
+// The largest number of keyframes, consecutive among those in `orders`, that agree.
+std::size_t OverlapFinder::LongestSeries(const std::set<std::size_t>& agreeing,
+                                         const std::vector<std::size_t>& orders) const {
+  std::size_t longest = 0, row = 0, last = 0;
+  for (const std::size_t order : orders) {
+    if (!agreeing.contains(order)) {
+      row = 0;
+      continue;
+    }
+    if (row == 0 || IsOtherViewpoint(At(keyframes_.in_b[last]), At(keyframes_.in_b[order]))) ++row;
+    last = order;
+    longest = std::max(longest, row);
+  }
+  return longest;
+}
+
+// The largest number of consecutive keyframes of B, or of one of its cameras, that were recognized in
+// agreement with the similarity.
 std::size_t OverlapFinder::LongestSeries(const Sim3& a_from_b) const {
   std::set<std::size_t> agreeing;
   for (const Recognition& recognition : recognitions_) {
@@ -181,17 +200,24 @@ std::size_t OverlapFinder::LongestSeries(const Sim3& a_from_b) const {
         options_.max_disagreement)
       agreeing.insert(recognition.order);
   }
-  std::size_t longest = 0, row = 0, last = 0;
-  for (const std::size_t order : agreeing) {
-    const bool continues = row > 0 && order == last + 1;
-    if (!continues) {
-      row = 1;
-    } else if (IsOtherViewpoint(At(keyframes_.in_b[last]), At(keyframes_.in_b[order]))) {
-      ++row;
+  std::vector<std::size_t> all;
+  // The keyframes of several cameras come by turns, and one camera may look elsewhere.
+  std::vector<std::vector<std::size_t>> by_lens;
+  for (std::size_t order = 0; order < keyframes_.in_b.size(); ++order) {
+    all.push_back(order);
+    const CameraModel& camera = *At(keyframes_.in_b[order]).camera;
+    const auto same = std::find_if(by_lens.begin(), by_lens.end(), [&](const auto& orders) {
+      return At(keyframes_.in_b[orders.front()]).camera->HasSameLens(camera);
+    });
+    if (same == by_lens.end()) {
+      by_lens.push_back({order});
+    } else {
+      same->push_back(order);
     }
-    last = order;
-    longest = std::max(longest, row);
   }
+  std::size_t longest = LongestSeries(agreeing, all);
+  for (const std::vector<std::size_t>& orders : by_lens)
+    longest = std::max(longest, LongestSeries(agreeing, orders));
   return longest;
 }
 

@@ -20,8 +20,8 @@ namespace docent::engine {
 
 struct MapOverlapOptions {
   LoopCandidateSearchOptions search = ThoroughSearch();
-  // This many consecutive keyframes, each from another viewpoint than the one before, must be recognized and
-  // agree, as for a loop.
+  // This many consecutive keyframes of one camera, each from another viewpoint than the one before, must be
+  // recognized and agree, as for a loop.
   std::size_t min_consecutive = 3;
   // Ratio of the median depth, radians, logarithm of the scale: as for a loop.
   double max_disagreement = 0.05;

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <atomic>
 #include <map>
+#include <numbers>
 #include <sstream>
 #include <string>
 #include <vector>
@@ -131,6 +132,35 @@ TEST(MapJoining, ComparesMapsWithoutJoiningThem) {
   EXPECT_LT(left.translation.norm(), 0.05);
   EXPECT_EQ(CompareMaps({}, *OverlappingPair().a, MapSnapshot(), nullptr).outcome,
             OverlapOutcome::kNothingToCompare);
+}
+
+// Each keyframe is followed by one of another camera, which looks in the opposite direction at something
+// else.
+TEST(MapJoining, CountsConsecutiveKeyframesOfOneCameraAmongThoseOfAnother) {
+  const MapSnapshot& b = *OverlappingPair().b;
+  const auto other = testing_world::PinholeCamera(420, 320);
+  const RenderedWorld elsewhere = Gallery({21, 22}, {31, 32});
+  const KeyFrame view = testing_world::MakeKeyFrame(elsewhere, other, InTheGallery(0.5));
+  const Rigid3 turned(Rotation3::Exp({0, std::numbers::pi, 0}), Eigen::Vector3d::Zero());
+  MapSnapshot both = b;
+  both.keyframes.clear();
+  for (KeyFrame keyframe : b.keyframes) {
+    keyframe.id *= 2;
+    both.keyframes.push_back(keyframe);
+    ++keyframe.id;
+    keyframe.fixed = false;
+    keyframe.camera = other;
+    keyframe.features = view.features;
+    keyframe.camera_from_map = turned * keyframe.camera_from_map;
+    both.keyframes.push_back(keyframe);
+  }
+  both.next_keyframe = 2 * b.next_keyframe;
+  for (MapPoint& point : both.points) point.source_keyframe *= 2;
+  for (Observation& observation : both.observations) observation.keyframe *= 2;
+  ASSERT_EQ(Validate(both), "");
+  const MapOverlap overlap = CompareMaps({}, *OverlappingPair().a, both, nullptr);
+  EXPECT_GE(overlap.consecutive, MapOverlapOptions().min_consecutive) << Brief(overlap);
+  EXPECT_EQ(overlap.outcome, OverlapOutcome::kOverlap) << Brief(overlap);
 }
 
 TEST(MapJoining, IsDeterministic) {
