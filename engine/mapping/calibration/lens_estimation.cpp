@@ -317,7 +317,7 @@ LensEstimation::Progress LensEstimation::EstimateLens(std::size_t lens, const st
 
 std::optional<CalibrationContradiction> LensEstimation::Check(const std::atomic<bool>* interrupt,
                                                               const Map& map) {
-  std::map<const CameraModel*, std::size_t> counts;
+  std::vector<std::size_t> counts(given_.size(), 0);  // keyframes of each of given_
   for (const auto& [id, record] : map.keyframes()) {
     const auto& image = record.keyframe.camera;
     const auto& model = image->lens_of_image() ? image->lens_of_image() : image;
@@ -325,13 +325,20 @@ std::optional<CalibrationContradiction> LensEstimation::Check(const std::atomic<
     bool estimated = false;
     for (std::size_t lens = 0; lens < lenses_.size(); ++lens) estimated |= IsVersionOf(lens, model.get());
     if (estimated) continue;
-    if (counts[model.get()]++ > 0) continue;
-    const auto known = std::find_if(given_.begin(), given_.end(),
-                                    [&](const GivenCalibration& checked) { return checked.model == model; });
-    if (known == given_.end()) given_.push_back({.model = model, .next_at = options_.min_checked_keyframes});
+    // A map that is loaded has models of its own.
+    const auto known = std::find_if(given_.begin(), given_.end(), [&](const GivenCalibration& checked) {
+      return checked.model->HasSameLens(*model);
+    });
+    if (known == given_.end()) {
+      given_.push_back({.model = model, .next_at = options_.min_checked_keyframes});
+      counts.push_back(1);
+    } else {
+      ++counts[static_cast<std::size_t>(known - given_.begin())];
+    }
   }
-  for (GivenCalibration& checked : given_) {
-    const std::size_t keyframes = counts[checked.model.get()];
+  for (std::size_t i = 0; i < given_.size(); ++i) {
+    GivenCalibration& checked = given_[i];
+    const std::size_t keyframes = counts[i];
     // A large error is found in a small map already, and the cost of a check grows with the map.
     constexpr std::size_t kMaxCheckedKeyFrames = 24;
     if (checked.done || keyframes < checked.next_at || keyframes > kMaxCheckedKeyFrames) continue;
@@ -344,9 +351,7 @@ std::optional<CalibrationContradiction> LensEstimation::Check(const std::atomic<
         LensModel::kRadialTangential,
         CameraModel::Intrinsics{in.width_px, in.height_px, focal, focal, in.cx, in.cy},
         radial ? std::array<double, 5>{k[0], k[1], 0, 0, 0} : std::array<double, 5>{});
-    const auto has_lens = [&](const CameraModel* model) {
-      return &model->WithoutMotion() == checked.model.get();
-    };
+    const auto has_lens = [&](const CameraModel* model) { return model->HasSameLens(*checked.model); };
     LensAssembly given = Assemble(map, start, has_lens);
     LensAssembly open = given;
     SelfCalibrationOptions calibration = options_.calibration;

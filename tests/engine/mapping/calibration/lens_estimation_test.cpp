@@ -245,6 +245,19 @@ TEST_F(LensEstimationTest, WarnsIfAGivenFocalLengthIsTooLongByHalf) {
   EXPECT_EQ(map.keyframes().at(0).keyframe.camera, given);
 }
 
+TEST_F(LensEstimationTest, WarnsOnlyOnceAboutACalibrationThatIsLoadedAgain) {
+  LensScene scene = MakeLensScene({.field_of_view_deg = 77, .noise_px = 0.4, .from_60_degrees = true});
+  LensEstimation estimation({});
+  int warnings = 0;
+  for (int map = 0; map < 2; ++map) {
+    const auto given = std::make_shared<const CameraModel>(LensWithFocalLength(640, 480, 620, 0));
+    for (BundleProblem::Camera& camera : scene.problem.cameras) camera.model = given;
+    estimation.Reset();
+    if (estimation.Check(nullptr, MapOf(scene))) ++warnings;
+  }
+  EXPECT_EQ(warnings, 1);
+}
+
 TEST_F(LensEstimationTest, DoesNotWarnAboutACorrectCalibration) {
   LensScene scene = MakeLensScene({.field_of_view_deg = 77, .k1 = -0.1, .noise_px = 0.4});
   const auto given = std::make_shared<const CameraModel>(scene.lens);
