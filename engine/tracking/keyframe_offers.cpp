@@ -130,14 +130,15 @@ void KeyFrameOffers::Offer(KeyFrameChoice choice, const CameraImage& image, cons
 
 std::optional<KeyFrameCandidate> KeyFrameOffers::Take() {
   if (candidate_)
-    taken_ = Taken{candidate_->choice, candidate_->time, static_cast<int>(candidate_->matches.size())};
+    taken_ = Taken{candidate_->choice, candidate_->time, static_cast<int>(candidate_->matches.size()),
+                   candidate_->camera};
   return std::exchange(candidate_, std::nullopt);
 }
 
 std::optional<Timestamp> KeyFrameOffers::Accept() {
   if (!taken_) return std::nullopt;
   frames_since_keyframe_ = 0;
-  policy_.Accepted(taken_->choice, taken_->time);
+  policy_.Accepted(taken_->choice, taken_->time, taken_->camera);
   accepted_ = std::exchange(taken_, std::nullopt);
   return accepted_->time;
 }

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <memory>
 #include <optional>
 #include <vector>
 
@@ -39,8 +40,10 @@ class KeyFrameOffers {
   void Consider(const CameraImage& image, const MapSnapshot& map, const TrackedPose& pose);
   // Offers the first image of a map that is empty so far.
   void OfferFirst(const CameraImage& image);
-  // The mapper made a panorama map of the image of this time.
-  void FirstIsMapped(Timestamp time) { policy_.Accepted(KeyFrameChoice::kFirst, time); }
+  // The mapper made a panorama map of the image that became this keyframe.
+  void FirstIsMapped(const KeyFrame& first) {
+    policy_.Accepted(KeyFrameChoice::kFirst, first.time, first.camera);
+  }
   void Withdraw() { candidate_.reset(); }
 
   // The offer of this frame, once.
@@ -56,6 +59,7 @@ class KeyFrameOffers {
     KeyFrameChoice choice = KeyFrameChoice::kNone;
     Timestamp time{};
     int inliers = 0;
+    std::shared_ptr<const CameraModel> camera;
   };
   // The last frame that had a position, with what an offer needs.
   struct Localized {

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <limits>
 #include <numbers>
+#include <utility>
 
 #include "engine/base/option_check.h"
 
@@ -43,6 +44,7 @@ KeyFramePolicy::KeyFramePolicy(const KeyFramePolicyOptions& options, double fiel
 void KeyFramePolicy::Reset() {
   mode_ = Mode::kSixDof;
   reference_time_ = {};
+  reference_camera_.reset();
   history_.clear();
 }
 
@@ -69,11 +71,17 @@ void KeyFramePolicy::AddToHistory(const Pose& pose) {
 
 PanoramaId KeyFramePolicy::OpenPanorama(const MapSnapshot& map) const {
   if (mode_ != Mode::kPanorama) return kNoId;
+  PanoramaId newest = kNoId;
   for (auto it = map.panoramas.rbegin(); it != map.panoramas.rend(); ++it) {
     const KeyFrame* reference = map.FindKeyFrame(it->reference);
-    if (reference && reference->time == reference_time_) return it->id;
+    if (!reference || reference->time != reference_time_) continue;
+    // Another camera may have opened one with an image of the same time. The calibration of the right one may
+    // have been estimated anew since.
+    if (reference_camera_ && reference->camera && reference->camera->HasSameLens(*reference_camera_))
+      return it->id;
+    if (newest == kNoId) newest = it->id;
   }
-  return kNoId;
+  return newest;
 }
 
 PanoramaId KeyFramePolicy::PanoramaNear(const Rigid3& camera_from_map, double depth,
@@ -102,6 +110,7 @@ void KeyFramePolicy::Reopen(const PanoramaMap& panorama, const MapSnapshot& map)
   if (!reference) return;
   mode_ = Mode::kPanorama;
   reference_time_ = reference->time;
+  reference_camera_ = reference->camera;
 }
 
 KeyFrameChoice KeyFramePolicy::Select(const PolicyFrame& frame, const MapSnapshot& map) {
@@ -156,10 +165,12 @@ KeyFrameChoice KeyFramePolicy::Select(const PolicyFrame& frame, const MapSnapsho
   return is_new_direction ? KeyFrameChoice::kPanorama : KeyFrameChoice::kNone;
 }
 
-void KeyFramePolicy::Accepted(KeyFrameChoice choice, Timestamp time) {
+void KeyFramePolicy::Accepted(KeyFrameChoice choice, Timestamp time,
+                              std::shared_ptr<const CameraModel> camera) {
   if (choice != KeyFrameChoice::kLocalizedPanorama && choice != KeyFrameChoice::kFirst) return;
   mode_ = Mode::kPanorama;
   reference_time_ = time;
+  reference_camera_ = std::move(camera);
 }
 
 }  // namespace docent::engine

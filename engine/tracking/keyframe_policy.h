@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
@@ -78,8 +79,9 @@ class KeyFramePolicy {
   // Returns what kind of keyframe this frame should become. The caller may ignore it; a later frame is chosen
   // again.
   KeyFrameChoice Select(const PolicyFrame& frame, const MapSnapshot& map);
-  // To be called when the mapper has accepted the frame of this time as a keyframe of this kind.
-  void Accepted(KeyFrameChoice choice, Timestamp time);
+  // To be called when the mapper has accepted the frame of this time as a keyframe of this kind. camera: that
+  // took it, which tells it from a keyframe of the same time of another camera; may be null.
+  void Accepted(KeyFrameChoice choice, Timestamp time, std::shared_ptr<const CameraModel> camera = nullptr);
 
   Mode mode() const { return mode_; }
   // The open panorama map in this snapshot; kNoId if none is open or the mapper has not created it yet.
@@ -102,8 +104,9 @@ class KeyFramePolicy {
   const KeyFramePolicyOptions options_;
   double field_of_view_;
   Mode mode_ = Mode::kSixDof;
-  Timestamp reference_time_{};  // time of the open panorama map's reference keyframe
-  std::vector<Pose> history_;   // does not allocate once it is full
+  Timestamp reference_time_{};                           // time of the open panorama map's reference keyframe
+  std::shared_ptr<const CameraModel> reference_camera_;  // its camera; may be null
+  std::vector<Pose> history_;                            // does not allocate once it is full
 };
 
 }  // namespace docent::engine

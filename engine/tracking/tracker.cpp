@@ -83,7 +83,7 @@ void Tracker::SetMap(std::shared_ptr<const MapSnapshot> map, std::uint64_t map_k
     const KeyFrame& first = map_->keyframes.front();
     pose_.Begin(first.time, first.camera_from_map, ObservedMotion::kPanorama);
     initialization_.FirstIsMapped(first.time, first.camera_from_map);
-    offers_.FirstIsMapped(first.time);
+    offers_.FirstIsMapped(first);
     state_ = TrackedState(confirmation_);
     relocalizer_.LoseLongAgo();
   } else if (initialization_.phase() == MapInitialization::Phase::kPairGiven) {

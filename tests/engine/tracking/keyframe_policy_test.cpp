@@ -365,6 +365,27 @@ TEST_F(KeyFramePolicyTest, FindsTheOpenPanoramaInANewSnapshot) {
   EXPECT_EQ(policy_.OpenPanorama(map), kNoId);
 }
 
+// Two synchronized cameras open one each.
+TEST_F(KeyFramePolicyTest, FindsItsOwnOfTwoPanoramasThatWereOpenedAtTheSameTime) {
+  const auto own = testing_world::PinholeCamera(400, 300), other = testing_world::PinholeCamera(420, 320);
+  MapSnapshot map = OpenedMap();
+  map.keyframes.back().camera = own;
+  map.keyframes.push_back(SixDof(2, 1, RotatedBy(90), 4));
+  map.keyframes.back().camera = other;
+  map.panoramas.push_back({4, 2});
+  policy_.Accepted(KeyFrameChoice::kLocalizedPanorama, FromSeconds(1), own);
+  EXPECT_EQ(policy_.OpenPanorama(map), 3u);
+  policy_.Accepted(KeyFrameChoice::kLocalizedPanorama, FromSeconds(1), other);
+  EXPECT_EQ(policy_.OpenPanorama(map), 4u);
+  policy_.Reopen(map.panoramas.front(), map);
+  EXPECT_EQ(policy_.OpenPanorama(map), 3u);
+  // The calibration was estimated anew.
+  policy_.Accepted(KeyFrameChoice::kLocalizedPanorama, FromSeconds(1),
+                   testing_world::PinholeCamera(320, 240));
+  map.panoramas.pop_back();
+  EXPECT_EQ(policy_.OpenPanorama(map), 3u);
+}
+
 TEST_F(KeyFramePolicyTest, EnablesAClosedPanoramaOnlyNearItsCentreAndViewingDirection) {
   const MapSnapshot map = OpenedMap();
   const auto near = [&](const Rigid3& pose) { return policy_.PanoramaNear(pose, kPointDepth, map); };
