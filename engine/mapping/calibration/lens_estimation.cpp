@@ -84,6 +84,11 @@ void ApplyToMap(const LensAssembly& assembly, const std::shared_ptr<const Camera
     if (old_depth > 0 && depth > 0) ratios[id].push_back(depth / old_depth);
   }
   std::map<KeyFrameId, Sim3> moved;
+  const auto add_dependent = [&](const KeyFrame& keyframe, KeyFrameId reference) {
+    const auto leader = moved.find(reference);
+    const double scale = leader != moved.end() ? leader->second.scale : 1;
+    moved[keyframe.id] = CorrectionBetween(before[keyframe.id], keyframe.camera_from_map, scale);
+  };
   for (std::size_t i = 0; i < assembly.cameras.size(); ++i) {
     const KeyFrameId id = assembly.cameras[i];
     KeyFrame& keyframe = map->FindKeyFrame(id)->keyframe;
@@ -110,10 +115,16 @@ void ApplyToMap(const LensAssembly& assembly, const std::shared_ptr<const Camera
       rotation_vector.head<2>() /= focal_ratio;
       const Rotation3 rotation = Rotation3::Exp(rotation_vector) * reference.rotation;
       keyframe.camera_from_map = Rigid3(rotation, -(rotation * center));
-      const auto leader = moved.find(panorama.reference);
-      const double scale = leader != moved.end() ? leader->second.scale : 1;
-      moved[id] = CorrectionBetween(before[id], keyframe.camera_from_map, scale);
+      add_dependent(keyframe, panorama.reference);
     }
+  }
+  // Dependent keyframes of a known lens followed their reference.
+  for (const auto& [id, record] : map->keyframes()) {
+    if (moved.contains(id)) continue;
+    const auto panorama =
+        std::find_if(map->panoramas().begin(), map->panoramas().end(),
+                     [&](const PanoramaMap& candidate) { return candidate.id == record.keyframe.panorama; });
+    add_dependent(record.keyframe, panorama != map->panoramas().end() ? panorama->reference : kNoId);
   }
   for (Map::PointRecord& record : map->points()) {
     if (!record.alive) continue;

@@ -201,6 +201,25 @@ TEST_F(LensEstimationTest, TurnsEachDependentKeyFrameByItsOwnChangeOfTheLens) {
   EXPECT_LT((turn_of(current, 2) - turn).norm(), 1e-6);
 }
 
+TEST_F(LensEstimationTest, TheCorrectionContainsADependentKeyFrameOfAnotherLens) {
+  const LensScene scene = MakeLensScene({.field_of_view_deg = 90, .noise_px = 0.3, .from_60_degrees = true});
+  Map map = MapOf(scene);
+  KeyFrame dependent = map.FindKeyFrame(1)->keyframe;
+  dependent.kind = KeyFrameKind::kPanorama;
+  dependent.panorama = map.OpenPanorama(1);
+  dependent.camera = std::make_shared<const CameraModel>(LensWithFocalLength(640, 480, 620, 0));
+  dependent.camera_from_map =
+      Rigid3(Rotation3::Exp({0.1, -0.2, 0.05}), Eigen::Vector3d::Zero()) * dependent.camera_from_map;
+  const KeyFrameId id = map.AddKeyFrame(dependent).keyframe.id;
+  LensEstimation estimation(OptionsFor(scene));
+  ASSERT_EQ(estimation.Step(&searcher_, nullptr, &map), Progress::kMapChanged);
+  const auto& moved = map.corrections().back()->after_from_before;
+  EXPECT_EQ(moved.size(), map.keyframes().size());
+  ASSERT_TRUE(moved.contains(id));
+  EXPECT_TRUE(IsNear(CorrectedPose(dependent.camera_from_map, moved.at(id)),
+                     map.FindKeyFrame(id)->keyframe.camera_from_map, 1e-9, 1e-9));
+}
+
 TEST_F(LensEstimationTest, ChangesNothingIfTheFocalLengthIsUndetermined) {
   const LensScene scene =
       MakeLensScene({.field_of_view_deg = 80, .noise_px = 0.5, .plane = true, .rotation = 0});
