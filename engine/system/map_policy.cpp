@@ -91,6 +91,10 @@ void MapPolicy::LeavePreviousMap(std::uint64_t previous, std::uint64_t entered, 
   left.provisional.End();
   state_.Emit(time, previous, MapLeft{});
   if (!left.after_loss) return;
+  // A map between two losses was left for the next new one, so that no return told what to join it with.
+  for (auto& [key, map] : state_.maps) {
+    if (key != entered && map.after_loss && map.join_with == 0 && map.MayBeJoined()) map.join_with = entered;
+  }
   if (left.snapshot && left.snapshot->HasFinitePoints()) {
     left.join_with = entered;
     return;

@@ -53,6 +53,11 @@ class PolicyForTwoCameras : public ::testing::Test {
     policy_.HandleResult(camera, &frame);
     return frame;
   }
+  // The camera is lost in its map at this time, and starts the next one after that.
+  void StartMapAfterLoss(std::size_t camera, double seconds) {
+    for (const double later : {0.0, 0.25}) Lose(camera, seconds + later);
+    for (const std::size_t each : {0, 1}) NextOrder(each);
+  }
   void Lose(std::size_t camera, double seconds) { Handle(camera, seconds, TrackingState::kLost); }
   // A camera started map 1, both are in it, and lost since this time.
   void LoseMapWithAPoint(double seconds) {
@@ -345,6 +350,22 @@ TEST_F(PolicyForTwoCameras, KeepsNoSnapshotOfAMapThatWasJoinedIntoAnother) {
   policy_.joins().Handle(attempt, &MapOf(1));
   EXPECT_EQ(MapOf(2).joined_into, 1u);
   EXPECT_FALSE(MapOf(2).snapshot);
+}
+
+TEST_F(PolicyForTwoCameras, JoinsAllMapsThatWereStartedAfterLossesWithTheOneThatTheCameraReturnsTo) {
+  options_.new_map_when_lost = true;
+  LoseMapWithAPoint(2);
+  for (const std::uint64_t key : {2, 3, 4}) {
+    StartMapAfterLoss(0, static_cast<double>(key));
+    ASSERT_EQ(state_.active_key, key);
+    MapOf(key).SetSnapshot(MapWithAPoint());
+  }
+  MapOf(3).permissions.join = false;
+  Handle(0, 5, TrackingState::kRelocalized, 1);
+  EXPECT_EQ(MapOf(4).join_with, 1u);
+  EXPECT_EQ(MapOf(3).join_with, 0u) << "it may not be joined";
+  EXPECT_EQ(MapOf(2).join_with, 1u);
+  EXPECT_EQ(MapOf(1).join_with, 0u);
 }
 
 TEST_F(PolicyForTwoCameras, AnswersARequestToJoinAMapThatWasRemovedMeanwhile) {
