@@ -3,12 +3,25 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstddef>
 #include <limits>
 #include <utility>
 
 #include "engine/recognition/absolute_pose.h"
 
 namespace docent::engine {
+
+namespace {
+
+std::ptrdiff_t FinitePointsOf(KeyFrameId keyframe, Map* map) {
+  return std::ranges::count_if(map->FindKeyFrame(keyframe)->observations,
+                               [map](const Observation& observation) {
+                                 const Map::PointRecord* point = map->FindPoint(observation.point);
+                                 return point && !point->point.infinite();
+                               });
+}
+
+}  // namespace
 
 std::optional<std::string> LoopCandidateSearchOptions::Validate() const {
   return OptionCheck()
@@ -42,7 +55,7 @@ std::set<KeyFrameId> Neighbourhood(KeyFrameId keyframe, double min_covisibility_
       for (const KeyFrameId observer : point->observers) ++shared[observer];
     }
     for (const auto& [id, count] : shared) {
-      const auto all = static_cast<double>(map->FindKeyFrame(id)->observations.size());
+      const auto all = static_cast<double>(FinitePointsOf(id, map));
       if (static_cast<double>(count) >= min_covisibility_ratio * all) known.insert(id);
     }
   }

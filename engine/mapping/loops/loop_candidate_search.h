@@ -43,8 +43,8 @@ struct LoopCandidateSearchOptions {
   std::optional<std::string> Validate() const;
 };
 
-// The keyframe, the keyframes that share at least the ratio min_covisibility_ratio of their points with it,
-// and those that share as much with these, and so on for `hops` steps.
+// The keyframe, the keyframes that share at least the ratio min_covisibility_ratio of their finite points
+// with it, and those that share as much with these, and so on for `hops` steps.
 std::set<KeyFrameId> Neighbourhood(KeyFrameId keyframe, double min_covisibility_ratio, int hops, Map* map);
 
 // How far a similarity moves a camera: the displacement of its centre as a ratio of the keyframe's median

@@ -81,6 +81,17 @@ TEST(LoopNeighbourhood, IgnoresInfinitePoints) {
   EXPECT_EQ(Neighbourhood(0, 0.2, 9, &map), (IdSet{0, 1}));
 }
 
+// The reference of a panorama map has many of them.
+TEST(LoopNeighbourhood, RequiresNoRatioOfInfinitePoints) {
+  Map map;
+  for (int i = 0; i < 2; ++i) map.AddKeyFrame(BlankKeyFrame());
+  Share(40, {0, 1}, &map);
+  Share(300, {1}, &map);
+  for (Map::PointRecord& record : map.points())
+    if (record.observers == std::vector<KeyFrameId>{1}) record.point.point_in_map = {0, 0, 1, 0};
+  EXPECT_EQ(Neighbourhood(0, 0.2, 1, &map), (IdSet{0, 1}));
+}
+
 TEST(LoopSimilarityMagnitude, IsRelativeToTheDepthAndTakesPlaceAtTheCamera) {
   KeyFrame keyframe = BlankKeyFrame(testing_world::CameraAt({1, 2, 3}, {20, -30, 10}));
   keyframe.mean_depth = 2;
