@@ -2,16 +2,14 @@
 #include "app/cameras/file_sources.h"
 
 #include <gmock/gmock.h>
-#include <spdlog/sinks/ostream_sink.h>
-#include <spdlog/spdlog.h>
 
 #include <algorithm>
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 #include <opencv2/videoio.hpp>
-#include <sstream>
 
 #include "app/cameras/clipped_source.h"
+#include "tests/app/support/log_of.h"
 #include "tests/app/support/temporary_folder.h"
 
 namespace docent::app {
@@ -283,18 +281,6 @@ TEST_F(Cameras, NameTheLineOfAnInvalidList) {
   EXPECT_THAT(ErrorOfReading(), HasSubstr("line 1"));
   folder_.Write("rgb.txt", "# nothing\n");
   EXPECT_THAT(ErrorOfReading(), HasSubstr("no images"));
-}
-
-// What is logged while the call runs.
-template <typename Call>
-std::string LogOf(const Call& call) {
-  std::ostringstream text;
-  const auto before = spdlog::default_logger();
-  spdlog::set_default_logger(
-      std::make_shared<spdlog::logger>("test", std::make_shared<spdlog::sinks::ostream_sink_mt>(text)));
-  call();
-  spdlog::set_default_logger(before);
-  return text.str();
 }
 
 TEST_F(Cameras, LeaveOutImagesWhoseTimesDoNotIncrease) {

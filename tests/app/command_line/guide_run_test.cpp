@@ -2,13 +2,13 @@
 #include "app/command_line/guide_run.h"
 
 #include <gmock/gmock.h>
-#include <spdlog/spdlog.h>
 
 #include <memory>
 #include <string>
 #include <vector>
 
 #include "engine/base/error.h"
+#include "tests/app/support/log_of.h"
 #include "tests/app/support/temporary_folder.h"
 
 namespace docent::app {
@@ -47,10 +47,8 @@ struct EndOfRun {
 EndOfRun RunToItsEnd(const GuideRequest& request, std::vector<CalibratedCamera> cameras) {
   EndOfRun end;
   GuideRun run(request, cameras);
-  spdlog::set_level(spdlog::level::info);  // A quiet command in the same process lowers it.
-  testing::internal::CaptureStdout();      // Where the log goes by default.
-  end.error = ErrorOf([&] { run.Run([](const std::shared_ptr<const ShownFrame>&) {}, {}); });
-  end.log = testing::internal::GetCapturedStdout();
+  end.log = LogOf(
+      [&] { end.error = ErrorOf([&] { run.Run([](const std::shared_ptr<const ShownFrame>&) {}, {}); }); });
   return end;
 }
 
