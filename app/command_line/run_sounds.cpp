@@ -9,7 +9,8 @@ RunSounds::RunSounds(const GuideRequest& request)
 }
 
 std::vector<Event> RunSounds::Add(ShownFrame* frame, std::span<const SoundDirector::Key> asked) {
-  if (std::exchange(visitors_before_, frame->visitors_before) != frame->visitors_before) director_.BeginAnew();
+  if (std::exchange(visitors_before_, frame->visitors_before) != frame->visitors_before)
+    director_.BeginAnew();
   for (const auto& [map_key, name] : asked) director_.Ask(map_key, name);
   static const content::Scene kNoScene;
   const engine::TrackedFrame& tracked = frame->tracked;

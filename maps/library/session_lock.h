@@ -26,8 +26,8 @@ enum class SessionLockKind {
 // The lock, from its construction to its destruction. It may not be used by two threads at once.
 class SessionLock {
  public:
-  // Throws LibraryInSession if a session holds the lock. Waits up to ten seconds for a replacement to end, and
-  // then throws docent::Error.
+  // Throws LibraryInSession if a session holds the lock. Waits up to ten seconds for a replacement to end,
+  // and then throws docent::Error.
   SessionLock(const std::filesystem::path& library, SessionLockKind kind);
   ~SessionLock();
   SessionLock(const SessionLock&) = delete;
