@@ -66,6 +66,16 @@ class PolicyForTwoCameras : public ::testing::Test {
     MapOf(1).SetSnapshot(MapWithAPoint());
     for (const std::size_t camera : {0, 1}) Lose(camera, seconds);
   }
+  // After the loss of map 1, camera 0 starts map 2, and is lost before it has depth.
+  void LoseTheMapAfterALoss() {
+    LoseMapWithAPoint(2);
+    Lose(0, 2.25);
+    for (const std::size_t camera : {0, 1}) NextOrder(camera);
+    MapOf(2).SetSnapshot(MapWithoutDepth());
+    Handle(0, 2.3, TrackingState::kPanorama, 2);
+    Lose(0, 2.4);
+    Lose(0, 2.6);
+  }
   // The application adds a panorama map, and both cameras search it.
   void EnterMapWithoutDepth(std::uint64_t key) {
     state_.AddMap(key).SetSnapshot(MapWithoutDepth());
@@ -239,13 +249,7 @@ TEST_F(PolicyForTwoCameras, LetsTheCameraThatWaitsForAMapAfterALossReturnToTheKn
 
 TEST_F(PolicyForTwoCameras, SearchesTheKnownMapsWhileAMapAfterALossIsReplaced) {
   options_.new_map_when_lost = true;
-  LoseMapWithAPoint(2);
-  Lose(0, 2.25);
-  for (const std::size_t camera : {0, 1}) NextOrder(camera);
-  MapOf(2).SetSnapshot(MapWithoutDepth());
-  Handle(0, 2.3, TrackingState::kPanorama, 2);
-  Lose(0, 2.4);
-  Lose(0, 2.6);
+  LoseTheMapAfterALoss();
   ASSERT_TRUE(MapOf(2).discarded);
   EXPECT_EQ(state_.association.SearchedMap(1), 0u);
 }
@@ -309,13 +313,7 @@ TEST_F(PolicyForTwoCameras, TracksAMapThatTheMapperHasMadeOfTheInitialViews) {
 
 TEST_F(PolicyForTwoCameras, KeepsNoSnapshotOfADiscardedMap) {
   options_.new_map_when_lost = true;
-  LoseMapWithAPoint(2);
-  Lose(0, 2.25);
-  for (const std::size_t camera : {0, 1}) NextOrder(camera);
-  MapOf(2).SetSnapshot(MapWithoutDepth());
-  Handle(0, 2.3, TrackingState::kPanorama, 2);
-  Lose(0, 2.4);
-  Lose(0, 2.6);
+  LoseTheMapAfterALoss();
   ASSERT_TRUE(MapOf(2).discarded) << "the camera was lost before it had depth";
   EXPECT_FALSE(MapOf(2).snapshot);
   for (const std::size_t camera : {0, 1}) NextOrder(camera);
