@@ -268,8 +268,9 @@ int NumberOf(const cv::Mat& image) {
 }
 
 // Feeds Motion-JPEG images into the loopback device until destruction. The loopback driver writes over images
-// that nobody has fetched, so that on a busy machine any number of them may be lost. A test that counts them
-// names the last one that it received, and the feeder then stays at most two images ahead of it, unless
+// that nobody has fetched, and over those that are being read, so that on a busy machine any number of them
+// may be lost or arrive twice. A test that counts them names the last one that it received, and the feeder
+// then stays at most three images ahead of it, which fit into the four buffers of the reader, unless
 // `longest_wait` passes.
 class JpegFeeder {
  public:
@@ -321,7 +322,7 @@ class JpegFeeder {
 };
 
 TEST(Loopback, DeliversSixtyMotionJpegImagesInOrder) {
-  JpegFeeder feeder(std::chrono::seconds(2));
+  JpegFeeder feeder(std::chrono::seconds(20));
   const auto source = OpenDevice(kLoopback, Options(V4L2_PIX_FMT_MJPEG));
   engine::Frame frame;
   std::vector<int> steps;

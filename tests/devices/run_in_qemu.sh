@@ -40,7 +40,9 @@ mount -t proc proc /proc; mount -t sysfs sysfs /sys; mount -t devtmpfs devtmpfs 
 for module in /modules/*; do
   case $module in
     *vivid.ko) insmod $module n_devs=1 node_types=0x1 num_inputs=1 input_types=0x0 ;;
-    *v4l2loopback.ko) insmod $module video_nr=9 exclusive_caps=1 card_label=loopback ;;
+    # With two buffers, its default, it writes over the image that is being read as soon as the next but one is
+    # written.
+    *v4l2loopback.ko) insmod $module video_nr=9 exclusive_caps=1 card_label=loopback max_buffers=8 ;;
     *) insmod $module ;;
   esac
 done
