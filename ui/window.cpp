@@ -148,6 +148,8 @@ Window::Window(const std::string& title, int width_px, int height_px) : impl_(st
   glfwSetWindowUserPointer(impl_->window, impl_.get());
   glfwSetMouseButtonCallback(impl_->window, Impl::OnButton);
   glfwSetKeyCallback(impl_->window, Impl::OnKey);
+  // A full screen stays when another window, such as a file dialog or a notification, gets the keyboard.
+  glfwWindowHint(GLFW_AUTO_ICONIFY, GLFW_FALSE);
   glfwSetDropCallback(impl_->window, Impl::OnDrop);
   glfwSetFramebufferSizeCallback(impl_->window, Impl::OnResize);
   glfwSetWindowCloseCallback(impl_->window, Impl::OnClose);
