@@ -14,6 +14,7 @@
 #include <utility>
 
 #include "engine/base/error.h"
+#include "ui/key_queue.h"
 #include "ui/theme.h"
 
 namespace docent::ui {
@@ -49,6 +50,7 @@ struct Gui::Impl {
   Window* window = nullptr;
   ImGuiContext* context = nullptr;
   double scale = 0;
+  KeyQueue keys;
   int focus_frames = 0;  // During which a window that FocusWindow chose keeps the keyboard in any case.
   int leave_frames = 0;  // Until the field is left that LeaveField leaves; 0 for none.
 
@@ -73,6 +75,7 @@ void Gui::Impl::Focus() {
 }
 
 void Gui::Impl::Leave() {
+  if (leave_frames == 1 && !keys.empty()) return;  // They were pressed before.
   if (leave_frames > 0 && --leave_frames == 0) ImGui::ClearActiveID();
 }
 
@@ -112,6 +115,7 @@ void Gui::Begin(double scale) {
     ImGui_ImplOpenGL3_NewFrame();
   }
   ImGui_ImplGlfw_NewFrame();
+  impl_->keys.Update(impl_->window);
   ImGui::NewFrame();
   impl_->Focus();
   impl_->Leave();

@@ -35,7 +35,8 @@ class Gui {
   void FocusWindow(const char* name);
   void LeaveWidgets();
   // Lets the text field that is being written be left as by a click elsewhere, so that what was typed becomes
-  // a change. It is left in the second frame from now on, since what was typed last reaches it in the first.
+  // a change. It is left in the second frame from now on, since what was typed last reaches it in the first;
+  // later if several keys were pressed between two frames.
   void LeaveField();
   // Whether that frame has not begun yet.
   bool IsLeavingField() const;

@@ -28,6 +28,11 @@ bool IsLetter(const std::string& text) {
   return text.size() == 1 && text[0] >= 'a' && text[0] <= 'z';
 }
 
+// Whether the key does more in a widget than to write a character. Modifiers belong to other keys.
+bool IsForWidgets(int key, bool control) {
+  return key < GLFW_KEY_LEFT_SHIFT && (control || key >= GLFW_KEY_ESCAPE || key == GLFW_KEY_SPACE);
+}
+
 bool IsAscii(const std::string& text) {
   return std::ranges::all_of(text, [](char c) { return static_cast<unsigned char>(c) < 0x80; });
 }
@@ -79,6 +84,7 @@ std::string KeyName(int key, const std::string& written) {
 struct Window::Impl {
   GLFWwindow* window = nullptr;
   std::vector<InputEvent> events;
+  std::vector<PressedKey> pressed;
   // The place and size of the window before it became full screen.
   Eigen::Vector2i place = Eigen::Vector2i::Zero(), size = Eigen::Vector2i::Zero();
 
@@ -102,6 +108,10 @@ struct Window::Impl {
     event.repeated = action == GLFW_REPEAT;
     event.control = (modifiers & GLFW_MOD_CONTROL) != 0;
     event.shift = (modifiers & GLFW_MOD_SHIFT) != 0;
+    if (action == GLFW_PRESS && IsForWidgets(key, event.control)) {
+      const int index = IsLetter(event.key) ? GLFW_KEY_A + event.key[0] - 'a' : key;
+      Of(window).pressed.push_back({key, index, event.control, event.shift});
+    }
     if (!event.key.empty()) Of(window).events.push_back(std::move(event));
   }
   static void OnDrop(GLFWwindow* window, int count, const char** paths) {
@@ -138,6 +148,8 @@ Window::Window(const std::string& title, int width_px, int height_px) : impl_(st
   glfwWindowHint(GLFW_CONTEXT_VERSION_MINOR, 3);
   glfwWindowHint(GLFW_OPENGL_PROFILE, GLFW_OPENGL_CORE_PROFILE);
   glfwWindowHint(GLFW_OPENGL_FORWARD_COMPAT, GLFW_TRUE);
+  // A full screen stays when another window, such as a file dialog or a notification, gets the keyboard.
+  glfwWindowHint(GLFW_AUTO_ICONIFY, GLFW_FALSE);
   impl_->window = glfwCreateWindow(width_px, height_px, title.c_str(), nullptr, nullptr);
   if (impl_->window == nullptr) {
     const std::string problem = LastProblem();
@@ -148,8 +160,6 @@ Window::Window(const std::string& title, int width_px, int height_px) : impl_(st
   glfwSetWindowUserPointer(impl_->window, impl_.get());
   glfwSetMouseButtonCallback(impl_->window, Impl::OnButton);
   glfwSetKeyCallback(impl_->window, Impl::OnKey);
-  // A full screen stays when another window, such as a file dialog or a notification, gets the keyboard.
-  glfwWindowHint(GLFW_AUTO_ICONIFY, GLFW_FALSE);
   glfwSetDropCallback(impl_->window, Impl::OnDrop);
   glfwSetFramebufferSizeCallback(impl_->window, Impl::OnResize);
   glfwSetWindowCloseCallback(impl_->window, Impl::OnClose);
@@ -167,8 +177,13 @@ void Window::MakeCurrent() {
 }
 
 std::vector<InputEvent> Window::PollEvents() {
+  impl_->pressed.clear();
   glfwPollEvents();
   return std::exchange(impl_->events, {});
+}
+
+std::vector<PressedKey> Window::TakePressedKeys() {
+  return std::exchange(impl_->pressed, {});
 }
 
 void Window::Show() {

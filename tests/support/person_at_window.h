@@ -15,9 +15,8 @@
 
 namespace docent {
 
-// A person at a window named "Docent" whose frames the test draws. Dear ImGui sees a key or a button only in
-// frames during which it is down, so both are held for a number of frames and not for a time: how long a
-// frame takes depends on the load.
+// A person at a window named "Docent" whose frames the test draws. A key and a button are held for a number
+// of frames and not for a time: how long a frame takes depends on the load.
 class PersonAtWindow {
  public:
   explicit PersonAtWindow(std::function<void()> draw) : draw_(std::move(draw)) {}
@@ -28,6 +27,12 @@ class PersonAtWindow {
     Act("search --name Docent windowfocus");
     Act("keydown " + key);
     Act("keyup " + key);
+  }
+  // Presses and releases keys, separated by spaces, while no frame is drawn.
+  void PressBetweenFrames(const std::string& keys) {
+    Act("search --name Docent windowfocus");
+    const std::string xdotool = "key --delay 20 " + keys;
+    EXPECT_EQ(std::system(("xdotool " + xdotool).c_str()), 0) << xdotool;
   }
   void Type(const std::string& text) {
     Act("search --name Docent windowfocus sleep 0.1 type --delay 60 " + text);

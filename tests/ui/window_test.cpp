@@ -83,6 +83,18 @@ class InterfaceOnScreen : public ::testing::Test {
     window_->Show();
   }
 
+  // The field has the keyboard then.
+  void BeginRenameOfHall() {
+    MapFacts other, hall;
+    other.name = "Attic";
+    hall.name = facts_.map_name = "Hall";
+    hall.is_initialized = true;
+    hall.policy = "open";
+    facts_.maps = {other, hall};
+    panel_->BeginMapRename();
+    for (int i = 0; i < 3; ++i) Draw();
+    ASSERT_TRUE(gui_->WritesText());
+  }
   void Click(const Eigen::Vector2d& point) { person_.Click(point); }
   void Press(const std::string& key) { person_.Press(key); }
 
@@ -164,6 +176,54 @@ TEST_F(InterfaceOnScreen, EscapeClosesTheQuestionAndQuitsNothing) {
   EXPECT_THAT(asked_.words, ElementsAre("save and quit"));
 }
 
+TEST_F(InterfaceOnScreen, KeysBetweenTwoFramesCountInTheirOrder) {
+  dialog_.Open();
+  for (int i = 0; i < 3; ++i) Draw();
+  person_.PressBetweenFrames("Right Return");
+  for (int i = 0; i < 6; ++i) Draw();
+  EXPECT_THAT(asked_.words, ElementsAre("quit without saving"));
+  person_.PressBetweenFrames("Left Right Right Escape");
+  for (int i = 0; i < 12; ++i) Draw();
+  EXPECT_FALSE(dialog_.is_open());
+  EXPECT_THAT(asked_.words, ElementsAre("quit without saving"));
+}
+
+TEST_F(InterfaceOnScreen, ControlKeysBetweenTwoFramesChangeTheText) {
+  BeginRenameOfHall();
+  person_.PressBetweenFrames("End ctrl+a ctrl+c End ctrl+v Return");
+  for (int i = 0; i < 16; ++i) Draw();
+  EXPECT_THAT(asked_.words, ElementsAre("rename map Hall to HallHall"));
+}
+
+TEST_F(InterfaceOnScreen, UndoAndRedoAreTheLettersOfTheLayout) {
+  gui_.reset();
+  window_.reset();
+  if (std::system("setxkbmap de") != 0) GTEST_SKIP() << "setxkbmap does not work";
+  window_.emplace("Docent", 800, 600);
+  gui_.emplace(&*window_);
+  BeginRenameOfHall();
+  Press("End");
+  Press("BackSpace");
+  Press("ctrl+z");
+  Press("ctrl+y");
+  Press("Return");
+  EXPECT_THAT(asked_.words, ElementsAre("rename map Hall to Hal"));
+}
+
+TEST_F(InterfaceOnScreen, AFieldIsLeftOnceItHasTheKeysThatWerePressedBefore) {
+  BeginRenameOfHall();
+  Press("End");
+  person_.PressBetweenFrames("BackSpace BackSpace");
+  gui_->LeaveField();
+  for (int i = 0; i < 8; ++i) Draw();
+  EXPECT_FALSE(gui_->IsLeavingField());
+  EXPECT_THAT(asked_.words, ElementsAre("rename map Hall to Ha"));
+}
+
+TEST_F(InterfaceOnScreen, AFullScreenStaysWhenAnotherWindowGetsTheKeyboard) {
+  EXPECT_EQ(glfwGetWindowAttrib(window_->handle(), GLFW_AUTO_ICONIFY), GLFW_FALSE);
+}
+
 TEST_F(InterfaceOnScreen, ThePanelOpensAndCloses) {
   const double open = layout_.panel.width;
   Click({layout_.panel.x + 20, 20});
@@ -207,15 +267,7 @@ TEST_F(InterfaceOnScreen, ASignpostPointsAheadByItsButtonWhileThereIsAPose) {
 }
 
 TEST_F(InterfaceOnScreen, TheCurrentMapIsRenamedInItsField) {
-  MapFacts other, hall;
-  other.name = "Attic";
-  hall.name = facts_.map_name = "Hall";
-  hall.is_initialized = true;
-  hall.policy = "open";
-  facts_.maps = {other, hall};
-  panel_->BeginMapRename();
-  for (int i = 0; i < 3; ++i) Draw();
-  ASSERT_TRUE(gui_->WritesText());
+  BeginRenameOfHall();
   Press("ctrl+a");
   person_.Type("Cove");
   Press("Return");
