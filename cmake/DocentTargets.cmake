@@ -117,6 +117,9 @@ function(docent_add_tests name)
   target_link_libraries(${name} PRIVATE ${ARG_LIBS} GTest::gtest GTest::gmock GTest::gtest_main)
   target_compile_definitions(${name} PRIVATE DOCENT_SOURCE_DIR="${PROJECT_SOURCE_DIR}"
     DOCENT_BINARY_DIR="${PROJECT_BINARY_DIR}")
+  # The libraries under test keep -O3. Tests run for less time than -O3 takes to compile them: g++ 12 takes 36 s for a
+  # part of the application's tests instead of 51 s.
+  target_compile_options(${name} PRIVATE $<$<CONFIG:Release>:-O1>)
   docent_precompile(${name} <gtest/gtest.h> <gmock/gmock.h>)
   if(ARG_UNITY)
     docent_unity(${name})
