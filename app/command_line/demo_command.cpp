@@ -16,7 +16,11 @@ void AddDemoCommand(CLI::App* program, Invocation* invocation,
       "docent demo --headless --output demo");
   const auto options = std::make_shared<DemoOptions>();
   command->add_flag("--headless", options->headless, "Open no window");
-  command->add_option("--output", options->output, "Folder for images, video and report")->type_name("DIR");
+  command
+      ->add_option("--output", options->output,
+                   "Folder for images, video and report, and for the library museum.docent, which replaces "
+                   "that of an earlier demonstration")
+      ->type_name("DIR");
   command->add_option("--record", options->record, "Write the augmented view as a video")
       ->type_name("FILE.mp4");
   AddSeedOption(command, &options->seed);

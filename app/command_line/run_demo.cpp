@@ -4,7 +4,9 @@
 #include <algorithm>
 #include <chrono>
 #include <cstdio>
+#include <filesystem>
 #include <opencv2/imgcodecs.hpp>
+#include <system_error>
 #include <utility>
 
 #include "app/cameras/clipped_source.h"
@@ -20,6 +22,7 @@
 #include "app/files/text_file.h"
 #include "app/session/library_scene.h"
 #include "engine/base/error.h"
+#include "maps/library/session_lock.h"
 #include "ui/context.h"
 #include "ui/map_view.h"
 
@@ -30,6 +33,7 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr const char* kScene = "museum:3";
+constexpr const char* kModelFile = "exhibit.glb";
 
 fs::path OutputFolder(const DemoOptions& options) {
   if (options.output) {
@@ -50,6 +54,22 @@ void WriteModel(const fs::path& path) {
 
 void WriteImage(const fs::path& path, const cv::Mat& image) {
   if (!cv::imwrite(path.string(), image)) throw Error("Cannot write '" + path.string() + "'.");
+}
+
+fs::path ScriptIn(const fs::path& folder) {
+  return folder / "author" / "script.txt";
+}
+
+// Throws Error for a library that no earlier demonstration in this folder has made.
+void CheckLibrary(const fs::path& library, const fs::path& folder) {
+  std::error_code error;
+  if (!fs::exists(library, error)) return;
+  const fs::path script = ScriptIn(folder);
+  // The name ends in .part if the demonstration was interrupted.
+  const bool has_script = fs::exists(script, error) || fs::exists(script.string() + ".part", error);
+  if (has_script && fs::exists(folder / kModelFile, error)) return;
+  throw Error("'" + library.string() +
+              "' already exists and is not of an earlier demonstration; give another folder with --output.");
 }
 
 // Makes a map's name usable in a file name: "Bay 3" becomes "Bay-3".
@@ -166,22 +186,22 @@ void PrintSummary(const DrawingCheck& check, std::size_t maps, const fs::path& f
 
 void RunDemo(const DemoOptions& options, Verbosity verbosity) {
   const fs::path folder = OutputFolder(options);
+  const fs::path library_path = folder / "museum.docent";
+  CheckLibrary(library_path, folder);
   SimulationOptions simulation_options;
   simulation_options.seed = options.seed;
   const std::shared_ptr<const Simulation> simulation = MakeSimulation(kScene, simulation_options);
-  const fs::path library_path = folder / "museum.docent";
-  std::error_code error;
-  fs::remove(library_path, error);  // An earlier demonstration may have left one in this folder.
-  WriteModel(folder / "exhibit.glb");
-
-  MuseumDirector director(*simulation, "exhibit.glb");
+  MuseumDirector director(*simulation, kModelFile);
   DemoRun author(simulation, 0, director.first_visit_frame(), "author");
   {
+    const maps::SessionLock lock(library_path, maps::SessionLockKind::kSession);
+    fs::remove(library_path);  // An earlier demonstration may have left one.
+    WriteModel(folder / kModelFile);
     maps::Library library = OpenLibrary(library_path, maps::Access::kReadWrite, maps::CreateIfMissing::kYes);
     GuideRequest request = CommonRequest(options, &library, folder / "author");
     request.may_write = true;
     request.model_folder = folder;
-    request.record_script = folder / "author" / "script.txt";
+    request.record_script = ScriptIn(folder);
     request.title = "Docent demonstration - the author";
     request.director = [&](const ShownFrame& frame) { return director.Direct(frame); };
     author.Run(std::move(request), verbosity);

@@ -19,6 +19,7 @@
 #include "app/simulator/simulation.h"
 #include "content/asset.h"
 #include "maps/library/library.h"
+#include "maps/library/session_lock.h"
 #include "tests/end_to_end/run_docent.h"
 
 namespace docent::app {
@@ -243,6 +244,29 @@ TEST(Guide, TheDemonstrationMakesMapsAndLeadsThroughThem) {
     EXPECT_THAT(ReadAll(folder / "demo" / name), StartsWith("\x89PNG\r\n")) << name;
   EXPECT_GT(std::filesystem::file_size(folder / "demo/tour.mp4"), 10000u);
   EXPECT_THAT(ReadAll(folder / "demo/report.html"), HasSubstr("tour"));
+}
+
+TEST(Guide, TheDemonstrationKeepsALibraryThatIsNotItsOwn) {
+  const TemporaryFolder folder;
+  const std::string path = (folder / "museum.docent").string();
+  {
+    maps::Library library = maps::Library::Open(path, maps::Access::kReadWrite, maps::CreateIfMissing::kYes);
+    library.Save({library.NewKey(), "Lions", maps::Policy::kOpen, nullptr, nullptr});
+  }
+  const std::vector<std::string> demo = {"demo", "--headless", "--output", folder.path().string()};
+  ExpectErrorLine(demo, 1, "museum.docent' already exists and is not of an earlier demonstration");
+  EXPECT_EQ(maps::Library::Open(path, maps::Access::kReadOnly).List().size(), 1u);
+}
+
+TEST(Guide, TheDemonstrationReplacesItsEarlierLibraryUnlessAnAuthorHasItOpen) {
+  const TemporaryFolder folder;
+  const std::string path = (folder / "museum.docent").string();
+  maps::Library::Open(path, maps::Access::kReadWrite, maps::CreateIfMissing::kYes);
+  for (const char* file : {"exhibit.glb", "author/script.txt.part"}) folder.Write(file, "");
+  const maps::SessionLock lock(path, maps::SessionLockKind::kSession);
+  ExpectErrorLine({"demo", "--headless", "--output", folder.path().string()}, 1,
+                  "is already open in docent author");
+  EXPECT_TRUE(std::filesystem::exists(path));
 }
 
 TEST(Guide, AuthorsAndToursWithTwoCamerasInOneMap) {
