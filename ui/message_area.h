@@ -16,7 +16,8 @@ double DrawMessages(const WindowLayout& layout, MessageBoard* board, AuthoringAc
 class QuitDialog {
  public:
   void Open() { opens_ = true; }
-  bool is_open() const { return is_open_; }
+  // From Open on, also before the next frame shows it.
+  bool is_open() const { return opens_ || is_open_; }
   // Between Gui::Begin and Gui::Draw. Escape cancels.
   void Draw(const WindowLayout& layout, AuthoringActions* actions);
 

@@ -170,7 +170,8 @@ void AuthorControls::Handle(const ui::InputEvent& event) {
     return AskToQuit();
   }
   if (event.kind == Kind::kRelease && event.button == 0) return pointer_.Release();
-  if (quit_dialog_.is_open()) return;
+  // What comes after the wish to quit changes nothing. Fields still get their keys, which do not come here.
+  if (quit_dialog_.is_open() || is_quitting_ || ending_ != Ending::kNone) return;
   if (event.kind == Kind::kKey) HandleKey(event);
   if (event.kind == Kind::kClick && event.button == 0 && !gui_.WantsMouse()) HandleClick(event);
   if (event.kind == Kind::kDrop) HandleDrop(event);

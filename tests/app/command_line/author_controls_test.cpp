@@ -266,6 +266,44 @@ TEST_F(AuthorAtControls, QuittingAsksNothingWhereNothingWasWritten) {
   EXPECT_EQ(controls_->ending(), AuthorControls::Ending::kSave);
 }
 
+TEST_F(AuthorAtControls, NothingIsPlacedOnceTheAuthorHasAskedToQuit) {
+  SetLens();
+  ASSERT_EQ(std::system("xdotool mousemove 300 400"), 0);
+  Draw(3);
+  ui::InputEvent quit, enter;
+  quit.key = "q";
+  quit.control = true;
+  enter.key = "enter";
+  const auto press_enter = [&] {
+    controls_->choices().pick = ui::MapPick::kFloor;
+    controls_->Handle(enter);
+  };
+  press_enter();
+  EXPECT_EQ(commands_.size(), 1u);
+  saving_.unsaved = true;
+  Draw(1);
+  // Both keys come in one frame.
+  controls_->Handle(quit);
+  press_enter();
+  EXPECT_EQ(commands_.size(), 1u);
+  EXPECT_EQ(controls_->ending(), AuthorControls::Ending::kNone);
+}
+
+TEST_F(AuthorAtControls, NothingIsPlacedOnceTheAuthorHasQuit) {
+  SetLens();
+  ASSERT_EQ(std::system("xdotool mousemove 300 400"), 0);
+  Draw(3);
+  ui::InputEvent quit, enter;
+  quit.key = "q";
+  quit.control = true;
+  enter.key = "enter";
+  controls_->choices().pick = ui::MapPick::kFloor;
+  controls_->Handle(quit);
+  EXPECT_EQ(controls_->ending(), AuthorControls::Ending::kSave) << "nothing was unsaved";
+  controls_->Handle(enter);
+  EXPECT_THAT(commands_, IsEmpty());
+}
+
 TEST_F(AuthorAtControls, ALengthIsMeasuredInOneImage) {
   SetLens();
   controls_->choices().pick = ui::MapPick::kMeasureFrom;
