@@ -138,6 +138,8 @@ std::optional<std::vector<InitializationResult>> ClassifyInitializationsOf(const
     TrueDepthOptions depth_options;
     depth_options.truth_noise_m = start_options.truth_noise_m;
     CalibratedCamera camera = OpenWindow(sequence, frame, {});
+    // An unknown lens is only guessed where a run begins.
+    if (run.lens_model) camera.model = run.lens_model;
     return MeasureTrueDepths(&camera, sequence.truth, pixels, depth_options);
   };
   return ClassifyInitializations(run, sequence.truth, true_depths, start_options);
@@ -226,7 +228,10 @@ RunRecord Track(const EvaluateOptions& options, const EvaluatedSequence& sequenc
   record.wall_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   record.peak_memory_mb = PeakMemoryMegabytes();
   record.mapping = MakeMappingTimes(session.MappingTimes());
-  if (const auto lens = session.EstimatedLensOf(0)) record.lens = MakeLensRecord(*lens);
+  if (const auto lens = session.EstimatedLensOf(0)) {
+    record.lens = MakeLensRecord(*lens);
+    record.lens_model = lens->model;
+  }
   for (const engine::CalibrationMonitor::Ring& ring : session.LensErrors(0))
     record.lens_rings.push_back({ring.samples, ring.mean_px, ring.sigma_px});
   // The session is destroyed first, because the adjustments below need memory for another copy of a map.

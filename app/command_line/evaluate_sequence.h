@@ -39,7 +39,8 @@ EvaluatedSequence DescribeSequence(const EvaluateOptions& options, std::size_t i
 CalibratedCamera OpenWindow(const EvaluatedSequence& sequence, std::uint64_t first_frame, Timestamp window);
 
 // Classifies the map initializations of a run as correct or false (see ClassifyInitializations). `key` gives
-// the run's first frame. Empty without ground truth. Throws Error.
+// the run's first frame. True depths are measured with the run's estimate of the lens where it has one. Empty
+// without ground truth. Throws Error.
 std::optional<std::vector<InitializationResult>> ClassifyInitializationsOf(const EvaluateOptions& options,
                                                                            const EvaluatedSequence& sequence,
                                                                            const RunKey& key,

@@ -3,11 +3,13 @@
 
 #include <Eigen/Core>
 #include <cstdint>
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
 
 #include "engine/base/time.h"
+#include "engine/geometry/camera_model.h"
 #include "engine/mapping/mapper.h"
 #include "engine/tracking/tracked_frame.h"
 
@@ -120,7 +122,9 @@ struct RunRecord {
   double wall_s = 0;
   double peak_memory_mb = 0;
   std::vector<InitializationRecord> initializations = {};  // One for each map with finite points, by frame.
-  std::optional<LensRecord> lens = {};    // Only of a camera whose calibration was estimated.
+  std::optional<LensRecord> lens = {};  // Only of a camera whose calibration was estimated.
+  // The model of that estimate; null for a known calibration.
+  std::shared_ptr<const engine::CameraModel> lens_model = {};
   std::vector<LensRing> lens_rings = {};  // From the image centre outwards.
 };
 
