@@ -277,6 +277,19 @@ void AddPropertyOptions(CLI::App* add, AddOptions* options, const std::vector<CL
       ->needs(kinds[3]);
 }
 
+// Refuses options of a FILE that are for files of another kind.
+void CheckKindOfFile(const CLI::App& add, const AddOptions& options) {
+  if (options.file.empty()) return;
+  const bool is_sound = KindOfFile(options.file) == content::AssetKind::kSound;
+  for (const char* name : {"--scale", "--yaw", "--rotation"}) {
+    if (is_sound && add.count(name) > 0) throw CLI::ValidationError(name, "is not for a sound");
+  }
+  for (const char* name : {"--caption", "--range"}) {
+    if (!is_sound && add.count(name) > 0) throw CLI::ValidationError(name, "is only for a sound");
+  }
+  if (is_sound && options.caption.empty()) throw CLI::ValidationError("--caption", "a sound needs a caption");
+}
+
 }  // namespace
 
 void AddContentAddCommand(CLI::App* group, Invocation* invocation) {
@@ -302,8 +315,7 @@ void AddContentAddCommand(CLI::App* group, Invocation* invocation) {
     if (options->file.empty() && options->signpost.empty() && options->label.empty() && !has_place)
       throw CLI::RequiredError("FILE, --signpost TEXT, --label TEXT, --trail POINTS or --occluder SHAPE");
     if (!options->position && !has_place) throw CLI::RequiredError("--at");
-    if (KindOfFile(options->file) == content::AssetKind::kSound && options->caption.empty())
-      throw CLI::ValidationError("--caption", "a sound needs a caption");
+    CheckKindOfFile(*add, *options);
     try {
       if (!options->trail.empty()) TrailPoints(options->trail);
       if (!options->occluder.empty()) OccluderShape(options->occluder);

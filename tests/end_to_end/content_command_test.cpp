@@ -117,6 +117,18 @@ TEST(ContentCommand, EditsTheContentOfASavedMap) {
   const std::string before = RunDocent({"content", "list", "--json", "--library", path}).output;
   ExpectErrorLine(run("edit", {"exhibit"}), 2, "No change is given");
   ExpectErrorLine(run("add", {"bell.wav", "--at", "0", "0", "2"}), 2, "a sound needs a caption");
+  for (const char* option : {"--scale", "--yaw"})
+    ExpectErrorLine(run("add", {"bell.wav", "--caption", "Bell", "--at", "0", "0", "2", option, "2"}), 2,
+                    std::string(option) + ": is not for a sound");
+  ExpectErrorLine(
+      run("add", {"bell.wav", "--caption", "Bell", "--at", "0", "0", "2", "--rotation", "0", "0", "0", "1"}),
+      2, "--rotation: is not for a sound");
+  for (const std::string& file : {model, std::string("plan.png")}) {
+    ExpectErrorLine(run("add", {file, "--at", "0", "0", "2", "--caption", "Fox"}), 2,
+                    "--caption: is only for a sound");
+    ExpectErrorLine(run("add", {file, "--at", "0", "0", "2", "--range", "2"}), 2,
+                    "--range: is only for a sound");
+  }
   ExpectErrorLine(run("add", {"--trail", "0 1"}), 2, "--trail");
   ExpectErrorLine(run("add", {"--trail", "0 1 1, pixel 1 1"}), 2, "no image with this pixel");
   ExpectErrorLine(run("add", {"--occluder", "ball at 0 0 1"}), 2, "--occluder");
