@@ -13,19 +13,29 @@ namespace docent::app {
 
 namespace {
 
-// Chooses the tool and the file with which a dropped file is placed. Returns false where it cannot be.
-bool ChooseToPlace(const std::string& file, ui::AuthoringChoices* choices) {
+// Chooses the tool and the file with which one of the dropped files is placed. Returns false where it cannot
+// be.
+bool ChooseToPlace(const std::string& file, const std::vector<std::string>& dropped,
+                   ui::AuthoringChoices* choices) {
   switch (KindOfFile(file)) {
     case content::AssetKind::kImage:
       choices->tool = ui::AuthoringTool::kImage;
       choices->image_file = file;
       return true;
-    case content::AssetKind::kSound:
+    case content::AssetKind::kSound: {
+      // The caption in the panel is for one sound, and for this one only while it can be seen there. Without
+      // another caption, its name is shown.
+      const auto is_sound = [](const std::string& other) {
+        return KindOfFile(other) == content::AssetKind::kSound;
+      };
+      const bool is_only_one = std::ranges::count_if(dropped, is_sound) == 1;
+      const bool is_seen = choices->tool == ui::AuthoringTool::kSound && choices->panel_open;
+      if (!is_only_one || !is_seen || choices->caption.empty())
+        choices->caption = content::NameFromFile(file);
       choices->tool = ui::AuthoringTool::kSound;
       choices->sound_file = file;
-      // Without another caption, its name is shown.
-      if (choices->caption.empty()) choices->caption = content::NameFromFile(file);
       return true;
+    }
     case content::AssetKind::kModel:
       choices->tool = ui::AuthoringTool::kModel;
       choices->model_file = file;
@@ -300,7 +310,7 @@ void AuthorControls::HandleDrop(const ui::InputEvent& event) {
   Eigen::Vector2d point = event.position;
   for (const std::string& file : event.files) {
     ui::AuthoringChoices choices = panel_.choices();
-    if (!ChooseToPlace(file, &choices)) {
+    if (!ChooseToPlace(file, event.files, &choices)) {
       board_.AddError(std::filesystem::path(file).filename().string() + ui::strings::kNoModelFile);
     } else if (!view_.ShowsImageAt(point)) {
       board_.AddError(ui::strings::kDropOnImage);

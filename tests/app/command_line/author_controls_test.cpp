@@ -352,6 +352,31 @@ TEST_F(AuthorAtControls, NothingIsPlacedAtAPixelThatTheMapFromAboveHides) {
   EXPECT_EQ(commands_.size(), 2u);
 }
 
+TEST_F(AuthorAtControls, ADroppedSoundHasACaptionThatTheAuthorSeesOrItsName) {
+  SetLens();
+  Draw(1);
+  controls_->choices().caption = "The lion roars";
+  const auto captions = [&](std::vector<std::string> files) {
+    ui::InputEvent drop;
+    drop.kind = ui::InputEvent::Kind::kDrop;
+    drop.position = {300, 400};
+    drop.files = std::move(files);
+    commands_.clear();
+    controls_->Handle(drop);
+    std::vector<std::string> found;
+    for (const Command& command : commands_) {
+      const auto* const sound = std::get_if<PlaceSound>(&command);
+      found.push_back(sound == nullptr ? "no sound" : sound->caption);
+    }
+    return found;
+  };
+  EXPECT_THAT(captions({"bird.wav"}), ElementsAre("bird")) << "the caption was of an earlier sound";
+  controls_->choices().tool = ui::AuthoringTool::kSound;
+  EXPECT_THAT(captions({"lion.wav"}), ElementsAre("The lion roars"));
+  EXPECT_THAT(captions({"lion.wav", "fox.glb"}), ElementsAre("The lion roars", "no sound"));
+  EXPECT_THAT(captions({"bird.wav", "lion.wav"}), ElementsAre("bird", "lion"));
+}
+
 TEST_F(AuthorAtControls, WhatWasDoneIsUndoneByTheButtonOfItsMessage) {
   controls_->Take({Notice{"", RenameEntity{"sign-1", "Cove"}}});
   Draw(3);
