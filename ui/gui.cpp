@@ -55,6 +55,7 @@ struct Gui::Impl {
   int leave_frames = 0;  // Until the field is left that LeaveField leaves; 0 for none.
 
   std::string window_to_focus;  // By the next frame; empty for none.
+  bool clicks = false;          // In the next frame.
 
   void Use() const { ImGui::SetCurrentContext(context); }
   // Within a frame, because Dear ImGui forgets such requests between frames.
@@ -116,6 +117,8 @@ void Gui::Begin(double scale) {
   }
   ImGui_ImplGlfw_NewFrame();
   impl_->keys.Update(impl_->window);
+  // The next frame has the state of the mouse again, so that the button is released.
+  if (std::exchange(impl_->clicks, false)) ImGui::GetIO().MouseDown[ImGuiMouseButton_Left] = true;
   ImGui::NewFrame();
   impl_->Focus();
   impl_->Leave();
@@ -135,6 +138,10 @@ void Gui::Draw() {
 bool Gui::WantsMouse() const {
   impl_->Use();
   return ImGui::GetIO().WantCaptureMouse;
+}
+
+void Gui::Click() {
+  impl_->clicks = true;
 }
 
 bool Gui::WritesText() const {

@@ -25,6 +25,8 @@ class Gui {
 
   // Whether the pointer is over a widget or held by one; such events are not those of the image.
   bool WantsMouse() const;
+  // Clicks in the next frame where the pointer is then, as with the left button of a mouse.
+  void Click();
   // Whether keys write into a text field.
   bool WritesText() const;
   // Whether a drop-down or dialog is open, which Escape closes.

@@ -251,6 +251,10 @@ bool AuthorControls::HandlePointerKey(const ui::InputEvent& event) {
     return true;
   }
   if (event.key != "enter" || event.repeated) return false;
+  if (gui_.WantsMouse()) {
+    gui_.Click();
+    return true;
+  }
   ui::InputEvent click = event;
   click.position = window_->PointerPosition();
   HandleClick(click);

@@ -82,8 +82,8 @@ class AuthorControls final : public CommandActions {
  private:
   void HandleKey(const ui::InputEvent& event);
   void HandleControlKey(const std::string& key);
-  // Moves the pointer over the image and clicks, for authors without a mouse. Whether the key is one for
-  // that.
+  // Moves the pointer and clicks in the image or on a widget, for authors without a mouse. Whether the key is
+  // one for that.
   bool HandlePointerKey(const ui::InputEvent& event);
   void Escape();
   void Emit(Command command);

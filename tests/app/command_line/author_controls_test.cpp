@@ -4,8 +4,11 @@
 
 #include <gmock/gmock.h>
 
+#include <cmath>
 #include <cstdlib>
 #include <optional>
+#include <string>
+#include <vector>
 
 #include "tests/app/support/temporary_folder.h"
 #include "tests/support/person_at_window.h"
@@ -73,12 +76,13 @@ class AuthorAtControls : public ::testing::Test {
     lens_ = engine::CameraModel(engine::LensModel::kRadialTangential, {640, 480, 500, 500, 320, 240}, {});
   }
   // The Undo button of the only message, at its right end.
-  void ClickUndo() {
+  Eigen::Vector2d UndoButton() const {
     const Eigen::Vector2i size = window_->WindowSize();
     const ui::Area image = ui::LayOutWindow(size.x(), size.y(), 1, controls_->choices().panel_open).image;
     const double right = 0.5 * image.width + std::min(280.0, 0.5 * image.width - 12);
-    person_.Click({right - 25, image.bottom() - 12 - 14});
+    return {right - 25, image.bottom() - 12 - 14};
   }
+  void ClickUndo() { person_.Click(UndoButton()); }
   void ClickPixel(const Eigen::Vector2d& pixel) {
     const Eigen::Vector2i size = window_->WindowSize();
     const ui::WindowLayout layout = ui::LayOutWindow(size.x(), size.y(), 1, controls_->choices().panel_open);
@@ -381,6 +385,20 @@ TEST_F(AuthorAtControls, WhatWasDoneIsUndoneByTheButtonOfItsMessage) {
   controls_->Take({Notice{"", RenameEntity{"sign-1", "Cove"}}});
   Draw(3);
   ClickUndo();
+  EXPECT_THAT(commands_, ElementsAre(Command(Undo{})));
+}
+
+TEST_F(AuthorAtControls, EnterPressesTheButtonUnderThePointerAndPlacesNothingBehindIt) {
+  SetLens();
+  controls_->Take({Notice{"", RenameEntity{"sign-1", "Cove"}}});
+  Draw(3);
+  const Eigen::Vector2d button = UndoButton();
+  const std::string move = "xdotool mousemove " + std::to_string(std::lround(button.x())) + " " +
+                           std::to_string(std::lround(button.y()));
+  ASSERT_EQ(std::system(move.c_str()), 0);
+  Draw(5);
+  controls_->choices().pick = ui::MapPick::kFloor;
+  PressReturn();
   EXPECT_THAT(commands_, ElementsAre(Command(Undo{})));
 }
 
