@@ -318,14 +318,19 @@ class GuideWindow {
     part.width_px = std::clamp(static_cast<int>(pixels * layout.image.width), 1, size.x());
     part.height_px = part.window_height_px = size.y();
     if (shows_map()) {
-      // The map goes on growing while the view is frozen.
+      // The map goes on growing while the view is frozen. Where no image comes, the window may change its
+      // size, and the prediction of relocalization comes later than the map.
+      constexpr auto kInterval = std::chrono::milliseconds(250);
+      const auto now = std::chrono::steady_clock::now();
       const auto& newest = newest_[large_];
-      if ((is_fresh || is_frozen() || !std::exchange(showed_map_, true)) && newest)
+      if ((is_fresh || is_frozen() || now - map_drawn_ >= kInterval) && newest) {
         map_panel_.Draw(*newest, part.width_px, part.height_px, true);
+        map_drawn_ = now;
+      }
       map_panel_.Present(part);
       return;
     }
-    showed_map_ = false;
+    map_drawn_ = {};
     ui::View view;
     if (large()) view = CurrentView();
     view.overlay.hud = large() != nullptr;
@@ -432,11 +437,11 @@ class GuideWindow {
   std::optional<std::uint64_t> recorded_;
   std::vector<ui::MapFacts> maps_;
   std::optional<std::chrono::steady_clock::time_point> maps_time_;
-  std::chrono::steady_clock::time_point small_map_drawn_{};
+  std::chrono::steady_clock::time_point map_drawn_{}, small_map_drawn_{};
   std::pair<bool, bool> drawn_choices_;  // Points and keyframes.
   double message_height_ = 0;            // Window units.
   cv::Mat image_;
-  bool redraw_ = false, was_frozen_ = false, showed_map_ = false;
+  bool redraw_ = false, was_frozen_ = false;
 };
 
 }  // namespace
