@@ -11,6 +11,7 @@
 
 #include "app/cameras/clipped_source.h"
 #include "app/cameras/simulated_source.h"
+#include "app/command_line/interruption.h"
 #include "app/command_line/map_panel.h"
 #include "app/command_line/run_guide.h"
 #include "app/command_line/runs.h"
@@ -87,6 +88,7 @@ class DemoRun {
     run_.run.name = std::move(name);
   }
 
+  // Throws Error if the program was interrupted.
   void Run(GuideRequest request, Verbosity verbosity) {
     const auto start = std::chrono::steady_clock::now();
     RunRecorder recorder;
@@ -101,6 +103,7 @@ class DemoRun {
     CalibratedCamera camera = Calibrate(
         ClipSource(std::move(source), simulation_->time(first_frame_) - begin, until), std::nullopt);
     maps_ = RunGuide(request, {&camera, 1}, verbosity);
+    if (Interruption::requested()) throw Error("Interrupted; the demonstration is incomplete.");
     run_.run.frames = recorder.frames();
     for (const Session::MapState& map : maps_) {
       if (!map.snapshot) continue;

@@ -103,6 +103,15 @@ TEST_P(InterruptedProgram, EndsATourWell) {
   EXPECT_TRUE(std::filesystem::exists(folder_ / "run/events.csv"));
 }
 
+TEST_P(InterruptedProgram, EndsTheDemonstrationBeforeItsTour) {
+  Start({"demo", "--headless", "--output", output_});
+  WaitUntil([this] { return std::filesystem::exists(folder_ / "run/author/events.csv.part"); });
+  EXPECT_EQ(Interrupt(), 1) << Errors();
+  EXPECT_THAT(Errors(), EndsWith("docent: Interrupted; the demonstration is incomplete.\n"));
+  EXPECT_FALSE(std::filesystem::exists(folder_ / "run/tour"));
+  EXPECT_THAT(ReadAll(folder_ / "out"), IsEmpty());
+}
+
 TEST_P(InterruptedProgram, WritesNoCalibration) {
   const std::string calibration = (folder_ / "camera.yaml").string();
   Start({"calibrate", "--camera", kLongWalk, "--headless", "--output", calibration});
