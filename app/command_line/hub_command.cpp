@@ -7,7 +7,6 @@
 #include <CLI/CLI.hpp>
 #include <cstdio>
 #include <filesystem>
-#include <iostream>
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <optional>
@@ -37,12 +36,14 @@ struct HubOptions {
 };
 using HubAction = void (*)(const HubOptions& options);
 
-// Hides what is typed while it exists.
+// Hides what is typed while it exists. Keys that interrupt, end or suspend the program are characters then,
+// or the terminal would go on hiding.
 class NoEcho {
  public:
   NoEcho() : is_terminal_(tcgetattr(STDIN_FILENO, &before_) == 0) {
     termios hidden = before_;
-    hidden.c_lflag &= ~static_cast<tcflag_t>(ECHO);
+    hidden.c_lflag &= ~static_cast<tcflag_t>(ECHO | ISIG);
+    hidden.c_cc[VEOL] = before_.c_cc[VINTR];  // It ends the line, so that it is read at once.
     if (is_terminal_) tcsetattr(STDIN_FILENO, TCSAFLUSH, &hidden);
   }
   ~NoEcho() {
@@ -51,27 +52,37 @@ class NoEcho {
   NoEcho(const NoEcho&) = delete;
   NoEcho& operator=(const NoEcho&) = delete;
   bool is_terminal() const { return is_terminal_; }
+  // Whether the character is one of those keys.
+  bool Interrupts(char c) const {
+    const auto key = static_cast<cc_t>(c);
+    return is_terminal_ &&
+           (key == before_.c_cc[VINTR] || key == before_.c_cc[VQUIT] || key == before_.c_cc[VSUSP]);
+  }
 
  private:
   termios before_{};
   bool is_terminal_;
 };
 
-std::string AskedLine(const std::string& question, bool is_terminal) {
-  if (is_terminal) std::fprintf(stderr, "%s: ", question.c_str());
+std::string AskedLine(const std::string& question, const NoEcho& hidden) {
+  if (hidden.is_terminal()) std::fprintf(stderr, "%s: ", question.c_str());
   std::string line;
-  const bool is_read = static_cast<bool>(std::getline(std::cin, line));
-  if (is_terminal) std::fputc('\n', stderr);
-  if (!is_read || line.empty())
-    throw Error("No password was given on standard input; the user was not added.");
+  bool is_interrupted = false;
+  for (int c = 0; !is_interrupted && (c = std::fgetc(stdin)) != EOF && c != '\n';) {
+    line += static_cast<char>(c);
+    is_interrupted = hidden.Interrupts(line.back());
+  }
+  if (hidden.is_terminal()) std::fputc('\n', stderr);
+  if (is_interrupted) throw Error("Interrupted; the user was not added.");
+  if (line.empty()) throw Error("No password was given on standard input; the user was not added.");
   return line;
 }
 
 // From the terminal, or the first line of standard input. It is never an argument, which others could read.
 std::string ReadPassword(const std::string& user) {
   const NoEcho hidden;
-  const std::string password = AskedLine("Password of " + user, hidden.is_terminal());
-  if (hidden.is_terminal() && AskedLine("Once more", true) != password)
+  const std::string password = AskedLine("Password of " + user, hidden);
+  if (hidden.is_terminal() && AskedLine("Once more", hidden) != password)
     throw Error("The two passwords differ; the user was not added.");
   return password;
 }

@@ -1,7 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 // The real program is told to end while it works, by Ctrl-C (SIGINT) or by the system (SIGTERM).
+#include <fcntl.h>
 #include <gmock/gmock.h>
 #include <signal.h>
+#include <stdlib.h>
+#include <termios.h>
+#include <unistd.h>
 
 #include <chrono>
 #include <filesystem>
@@ -26,7 +30,7 @@ using ::testing::IsEmpty;
 // Images of an hour, black after twenty seconds: no run ends by itself meanwhile.
 constexpr const char* kLongWalk = "sim:room,rest=3600,rest-at=20";
 
-class InterruptedProgram : public ::testing::TestWithParam<int> {
+class RunningProgram : public ::testing::Test {
  protected:
   void TearDown() override {
     if (child_ > 0) {
@@ -35,8 +39,8 @@ class InterruptedProgram : public ::testing::TestWithParam<int> {
     }
   }
 
-  void Start(const std::vector<std::string>& arguments) {
-    child_ = StartDocent(arguments, (folder_ / "out").string(), (folder_ / "err").string());
+  void Start(const std::vector<std::string>& arguments, const std::string& input = "/dev/null") {
+    child_ = StartDocent(arguments, (folder_ / "out").string(), (folder_ / "err").string(), input);
   }
   bool IsRunning() const {
     siginfo_t ended{};
@@ -49,6 +53,24 @@ class InterruptedProgram : public ::testing::TestWithParam<int> {
     while (!is_so() && IsRunning() && std::chrono::steady_clock::now() < end)
       std::this_thread::sleep_for(std::chrono::milliseconds(5));
   }
+  // Waits for the end; empty if the program still runs.
+  std::optional<int> ExitStatus() {
+    WaitUntil([] { return false; });
+    if (IsRunning()) return std::nullopt;
+    int status = -1;
+    waitpid(std::exchange(child_, -1), &status, 0);
+    return WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status);
+  }
+  std::string Errors() const { return ReadAll(folder_ / "err"); }
+
+  const TemporaryFolder folder_;
+  const std::string library_ = (folder_ / "room.docent").string(), output_ = (folder_ / "run").string();
+  pid_t child_ = -1;
+};
+
+// The parameter is the signal.
+class InterruptedProgram : public RunningProgram, public ::testing::WithParamInterface<int> {
+ protected:
   // Whether the program has said that it handles the signal itself.
   bool HandlesTheSignal() const {
     const std::string status = ReadAll("/proc/" + std::to_string(child_) + "/status"), name = "SigCgt:";
@@ -60,19 +82,8 @@ class InterruptedProgram : public ::testing::TestWithParam<int> {
   std::optional<int> Interrupt() {
     EXPECT_TRUE(IsRunning()) << Errors();
     kill(child_, GetParam());
-    WaitUntil([] { return false; });
-    if (IsRunning()) return std::nullopt;
-    int status = -1;
-    waitpid(std::exchange(child_, -1), &status, 0);
-    return WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status);
+    return ExitStatus();
   }
-  std::string Errors() const { return ReadAll(folder_ / "err"); }
-
-  const TemporaryFolder folder_;
-  const std::string library_ = (folder_ / "room.docent").string(), output_ = (folder_ / "run").string();
-
- private:
-  pid_t child_ = -1;
 };
 INSTANTIATE_TEST_SUITE_P(Interruption, InterruptedProgram, ::testing::Values(SIGINT, SIGTERM),
                          [](const auto& signal) { return signal.param == SIGINT ? "CtrlC" : "Terminate"; });
@@ -119,6 +130,33 @@ TEST_P(InterruptedProgram, WritesNoCalibration) {
   EXPECT_EQ(Interrupt(), 1);
   EXPECT_THAT(Errors(), EndsWith("docent: Interrupted; nothing was written.\n"));
   EXPECT_FALSE(std::filesystem::exists(calibration));
+}
+
+TEST_F(RunningProgram, ATerminalShowsWhatIsTypedAgainAfterAnInterruptedPassword) {
+  const int keyboard = posix_openpt(O_RDWR | O_NOCTTY);
+  if (keyboard < 0) GTEST_SKIP() << "this system has no pseudo-terminals";
+  ASSERT_EQ(grantpt(keyboard), 0);
+  ASSERT_EQ(unlockpt(keyboard), 0);
+  const std::string terminal = ptsname(keyboard);
+  // While it is open, the terminal keeps its settings when the program ends.
+  const int screen = open(terminal.c_str(), O_RDWR | O_NOCTTY);
+  ASSERT_GE(screen, 0);
+  Start({"hub", "user", "add", "anna", "--role", "curator", "--password", "--hub", "postgresql:///docent"},
+        terminal);
+  WaitUntil([this] { return Errors().find("Password of anna: ") != std::string::npos; });
+  termios settings{};
+  ASSERT_EQ(tcgetattr(screen, &settings), 0);
+  EXPECT_EQ(settings.c_lflag & ECHO, 0u);
+  ASSERT_EQ(settings.c_lflag & ISIG, 0u) << "Ctrl-C would end the program while the terminal hides";
+  constexpr char kTyped[] = "secret\x03";
+  ASSERT_EQ(write(keyboard, kTyped, sizeof kTyped - 1), static_cast<ssize_t>(sizeof kTyped - 1));
+  EXPECT_EQ(ExitStatus(), 1) << Errors();
+  EXPECT_THAT(Errors(), EndsWith("docent: Interrupted; the user was not added.\n"));
+  ASSERT_EQ(tcgetattr(screen, &settings), 0);
+  EXPECT_NE(settings.c_lflag & ECHO, 0u);
+  EXPECT_NE(settings.c_lflag & ISIG, 0u);
+  close(screen);
+  close(keyboard);
 }
 
 }  // namespace

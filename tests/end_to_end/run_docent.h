@@ -22,16 +22,17 @@ extern char** environ;
 // Helpers that run the real program as a user would, and read its output.
 namespace docent::app {
 
-// Starts the program with its standard output and errors in these files and an empty standard input.
+// Starts the program with its standard output and errors in these files and the standard input from a file
+// or terminal; by default it is empty.
 inline pid_t StartDocent(std::vector<std::string> arguments, const std::string& output,
-                         const std::string& errors) {
+                         const std::string& errors, const std::string& input = "/dev/null") {
   arguments.insert(arguments.begin(), DOCENT_BINARY_DIR "/docent");
   std::vector<char*> argv;
   for (std::string& argument : arguments) argv.push_back(argument.data());
   argv.push_back(nullptr);
   posix_spawn_file_actions_t actions;
   posix_spawn_file_actions_init(&actions);
-  posix_spawn_file_actions_addopen(&actions, STDIN_FILENO, "/dev/null", O_RDONLY, 0);
+  posix_spawn_file_actions_addopen(&actions, STDIN_FILENO, input.c_str(), O_RDONLY | O_NOCTTY, 0);
   posix_spawn_file_actions_addopen(&actions, STDOUT_FILENO, output.c_str(), O_WRONLY | O_CREAT, 0600);
   posix_spawn_file_actions_addopen(&actions, STDERR_FILENO, errors.c_str(), O_WRONLY | O_CREAT, 0600);
   pid_t child = 0;
