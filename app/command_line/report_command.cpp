@@ -3,7 +3,10 @@
 
 #include <CLI/CLI.hpp>
 #include <cstdio>
+#include <filesystem>
 #include <memory>
+#include <string>
+#include <vector>
 
 #include "app/command_line/program.h"
 #include "app/files/checked_file.h"
@@ -18,12 +21,17 @@ struct ReportOptions {
   std::filesystem::path folder, output;
 };
 
+// Also of "visits/", "." and "..", which have no name of their own.
+std::string NameOfFolder(const std::filesystem::path& folder) {
+  return std::filesystem::absolute(folder / "").lexically_normal().parent_path().filename().string();
+}
+
 void Report(const ReportOptions& options, Verbosity verbosity) {
   std::vector<std::string> problems;
   const std::vector<VisitRecord> visits = ReadVisits(options.folder, &problems);
   for (const std::string& problem : problems) spdlog::warn("{}", problem);
   CheckedFile file(options.output);
-  file.Write(FormatVisitReport(visits, "Visits in " + options.folder.filename().string()));
+  file.Write(FormatVisitReport(visits, "Visits in " + NameOfFolder(options.folder)));
   file.Close();
   if (verbosity == Verbosity::kQuiet) return;
   std::printf("%zu %s; the report is in %s\n", visits.size(), visits.size() == 1 ? "visit" : "visits",

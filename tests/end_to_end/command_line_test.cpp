@@ -127,6 +127,17 @@ TEST(Messages, AreOneLineWithOneFullStop) {
   EXPECT_EQ(OneLine("wait..."), "wait...");
 }
 
+TEST(CommandLine, TheTitleOfAReportNamesItsFolder) {
+  const TemporaryFolder folder;
+  std::filesystem::create_directories(folder / "visits/old");
+  const auto page = folder / "report.html";
+  for (const char* name : {"visits", "visits/", "visits/.", "visits/old/.."}) {
+    const Outcome outcome = RunDocent({"report", (folder / name).string(), "--output", page.string()});
+    EXPECT_EQ(outcome.exit_status, 0) << outcome.errors;
+    EXPECT_THAT(ReadAll(page), HasSubstr("Visits in visits<")) << name;
+  }
+}
+
 TEST(CommandLine, AlignsTheListOfMapsWhateverTheirNames) {
   const TemporaryFolder folder;
   const auto file = folder / "l.docent";
