@@ -104,7 +104,8 @@ void VisitorHost::GuideAgain(std::size_t index, const engine::CameraModel& camer
   visitors_[index]->Guide(frame, camera);
   AddQuestion(frame.get());
   ReportCards(index, time);
-  if (index == 0) Narrate(*frame, camera);
+  // A skipped image does not say that what can be read has left the view.
+  if (index == 0 && frame->tracked.state != engine::TrackingState::kDropped) Narrate(*frame, camera);
   ReportRoute(time);
 }
 

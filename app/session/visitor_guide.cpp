@@ -5,6 +5,15 @@
 
 namespace docent::app {
 
+namespace {
+
+// Such an image says nothing about the visitor, not even that the camera sees nothing.
+bool IsSkipped(const ShownFrame& frame) {
+  return frame.tracked.state == engine::TrackingState::kDropped;
+}
+
+}  // namespace
+
 void VisitorGuide::Guide(const std::shared_ptr<ShownFrame>& frame, const engine::CameraModel& camera) {
   const bool has_pose = claim_.Update(frame->seconds, frame->tracked.state, frame->tracked.map_key);
   if (!has_pose && engine::HasPose(frame->tracked.state)) frame->shown.scene.reset();
@@ -20,7 +29,7 @@ void VisitorGuide::Guide(const std::shared_ptr<ShownFrame>& frame, const engine:
   if (has_pose && frame->shown.scene)
     frame->way = FindWay(*frame->shown.scene, camera, frame->tracked.camera_from_map, route_, strings_);
   if (frame->way) frame->visitor->way_on = frame->way->drawn;
-  cards_.Update(camera, frame.get());
+  if (!IsSkipped(*frame)) cards_.Update(camera, frame.get());
   std::optional<Eigen::Vector3d> place;
   if (has_pose && frame->shown.scene) place = frame->tracked.camera_from_map.OriginInSource();
   static const content::Scene kNoScene;
@@ -72,7 +81,7 @@ std::string VisitorHint(const RejectionMessage& rejection, engine::Hint hint, co
 void VisitorGuide::FollowRoute(bool has_pose, ShownFrame* frame) {
   if (has_pose) {
     route_->Enter(frame->tracked.map_key, frame->seconds);
-  } else {
+  } else if (!IsSkipped(*frame)) {
     route_->Leave();
   }
   ui::VisitorDisplay& display = *frame->visitor;

@@ -34,7 +34,8 @@ class VisitorGuide {
 
   // Sets the frame's `visitor`, `way` and `animation_starts`; `camera` is the lens of its image. Shortly
   // after a loss the frame gets the content and the pose of the last frame that had one. Where the place is
-  // not to be claimed (PlaceClaim), the frame loses its content.
+  // not to be claimed (PlaceClaim), the frame loses its content. A skipped image, which is not shown, changes
+  // neither cards nor route, and its frame gets no card.
   void Guide(const std::shared_ptr<ShownFrame>& frame, const engine::CameraModel& camera);
   VisitorCards* cards() { return &cards_; }
 

@@ -3,6 +3,12 @@
 #include "app/command_line/visitor_host.h"
 
 #include <gmock/gmock.h>
+#include <stdlib.h>
+
+#include <cstdlib>
+#include <memory>
+#include <string>
+#include <vector>
 
 #include "tests/app/support/simulated_session.h"
 #include "tests/app/support/temporary_folder.h"
@@ -11,6 +17,7 @@ namespace docent::app {
 namespace {
 
 using namespace simulated_session;
+using ::testing::Contains;
 using ::testing::DoubleEq;
 using ::testing::ElementsAre;
 using ::testing::Field;
@@ -119,6 +126,50 @@ TEST(VisitorHost, WelcomesALaterVisitorWithoutTheLibrary) {
     host.Guide(0, simulation->camera(), frame);
   }
   EXPECT_THAT(frame->visitor->stops, ElementsAre("Hall", "Yard")) << "the maps of the session";
+}
+
+// A tour that is narrated, on a machine that has no program to speak with.
+class NarratedTour : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    path_ = std::getenv("PATH") != nullptr ? std::getenv("PATH") : "";
+    setenv("PATH", folder_.path().c_str(), 1);
+  }
+  void TearDown() override { setenv("PATH", path_.c_str(), 1); }
+
+  const TemporaryFolder folder_;
+  std::string path_;
+};
+
+TEST_F(NarratedTour, ReadsASignThatStaysInViewAlthoughImagesAreSkipped) {
+  const auto simulation = Room(3);
+  Session session(Options(Pace::kLockstep, "Desk"), LensOf(*simulation), nullptr);
+  GuideRequest request;
+  request.language = "en";
+  request.narrate = true;
+  std::vector<std::string> narrated;
+  VisitorHost host(request, &session, 1, [&](const Event& event) {
+    if (event.event == "narration") narrated.push_back(event.detail);
+  });
+  auto scene = std::make_shared<content::Scene>();
+  content::Entity& label = scene->entities.emplace_back();
+  label.name = "lions";
+  label.kind = content::Entity::Kind::kLabel;
+  label.label.text = "Ivory, about 1900";
+  label.label.anchor = Eigen::Vector3d(0, 0, 1);
+  label.label.text_height = 0.02;
+  for (int i = 0; i < 40; ++i) {
+    const auto frame = std::make_shared<ShownFrame>();
+    frame->seconds = 0.1 * i;
+    frame->tracked.state = i % 2 == 0 ? engine::TrackingState::kSixDof : engine::TrackingState::kDropped;
+    if (engine::HasPose(frame->tracked.state)) {
+      frame->tracked.map_key = 1;
+      frame->shown.map_name = "Desk";
+      frame->shown.scene = scene;
+    }
+    host.Guide(0, simulation->camera(), frame);
+  }
+  EXPECT_THAT(narrated, Contains("Ivory, about 1900"));
 }
 
 }  // namespace

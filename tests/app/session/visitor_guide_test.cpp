@@ -3,6 +3,9 @@
 
 #include <gtest/gtest.h>
 
+#include <memory>
+#include <string>
+
 #include "tests/app/support/simulated_session.h"
 
 namespace docent::app {
@@ -58,6 +61,73 @@ TEST(VisitorGuide, SaysTheEndOfATourForAWhileInTheSentence) {
   EXPECT_EQ(sentence_at(1), "The tour ends here. You saw 1 of 2 stops.");
   EXPECT_EQ(sentence_at(8, engine::Hint::kMoveMoreSlowly), "The tour ends here. You saw 1 of 2 stops.");
   EXPECT_EQ(sentence_at(10), "");
+}
+
+// A visitor at the first of two stops who looks at a label, with a machine that skips images.
+class VisitorWithSkippedImages : public ::testing::Test {
+ protected:
+  VisitorWithSkippedImages() {
+    content::Entity label;
+    label.name = "lions";
+    label.kind = content::Entity::Kind::kLabel;
+    label.label.text = "Lions.";
+    label.label.anchor = Eigen::Vector3d(0, 0, 2);
+    auto scene = std::make_shared<content::Scene>();
+    scene->entities = {label};
+    scene_ = std::move(scene);
+    Route route;
+    route.stops = {{1, "Desk"}, {2, "Door"}};
+    route_.emplace(route);
+    guide_.emplace(&session_, std::vector<std::string>{"Desk", "Door"}, VisitorStringsFor("en"), &*route_,
+                   "en", true);
+  }
+  std::shared_ptr<const ShownFrame> See(double seconds, engine::TrackingState state) {
+    const engine::CameraModel camera(engine::LensModel::kRadialTangential, {640, 480, 500, 500, 319.5, 239.5},
+                                     {});
+    const auto frame = std::make_shared<ShownFrame>();
+    frame->seconds = seconds;
+    frame->tracked.state = state;
+    if (engine::HasPose(state)) {
+      frame->tracked.map_key = 1;
+      frame->shown.map_name = "Desk";
+      frame->shown.scene = scene_;
+    }
+    guide_->Guide(frame, camera);
+    return frame;
+  }
+
+  const std::shared_ptr<const Simulation> simulation_ = Room(3);
+  Session session_{Options(Pace::kLockstep, "Desk"), LensOf(*simulation_), nullptr};
+  std::shared_ptr<const content::Scene> scene_;
+  std::optional<RouteState> route_;
+  std::optional<VisitorGuide> guide_;
+};
+
+TEST_F(VisitorWithSkippedImages, OpensByGazeWhatStaysInTheMiddle) {
+  std::shared_ptr<const ShownFrame> frame;
+  for (double seconds = 0; seconds < 3; seconds += 0.2) {
+    frame = See(seconds, engine::TrackingState::kSixDof);
+    See(seconds + 0.1, engine::TrackingState::kDropped);
+  }
+  ASSERT_TRUE(frame->visitor->card);
+  EXPECT_EQ(frame->visitor->card->entity, "lions");
+}
+
+TEST_F(VisitorWithSkippedImages, CanOpenWhatWasInViewBefore) {
+  See(0, engine::TrackingState::kSixDof);
+  See(0.1, engine::TrackingState::kDropped);
+  EXPECT_NO_THROW(guide_->cards()->Do({GuideVisitor::Step::kPress, {}}));
+  const auto frame = See(0.2, engine::TrackingState::kSixDof);
+  ASSERT_TRUE(frame->visitor->card);
+  EXPECT_EQ(frame->visitor->card->entity, "lions");
+}
+
+TEST_F(VisitorWithSkippedImages, StaysAtAStopUntilTheCameraIsLost) {
+  See(0, engine::TrackingState::kSixDof);
+  See(0.1, engine::TrackingState::kDropped);
+  EXPECT_EQ(route_->Here(), 0u);
+  See(0.2, engine::TrackingState::kLost);
+  EXPECT_EQ(route_->Here(), std::nullopt);
 }
 
 }  // namespace
