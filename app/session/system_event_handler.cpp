@@ -237,7 +237,7 @@ void SystemEventHandler::AbsorbMap(SessionMap* from, const engine::JoinedMap& jo
       return true;
     });
     // The history is saved with the scene.
-    if (changed || history_changed) map.scene = std::move(other);
+    if (changed || history_changed) map.Follow(std::move(other));
   }
 }
 

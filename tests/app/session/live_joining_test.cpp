@@ -5,12 +5,17 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <memory>
+#include <string>
 #include <vector>
 
+#include "app/session/library_scene.h"
 #include "app/session/surface_at_pixel.h"
+#include "content/asset.h"
 #include "engine/geometry/sim3.h"
 #include "tests/app/support/simulated_session.h"
 #include "tests/app/support/temporary_folder.h"
+#include "tests/maps/map_samples.h"
 
 namespace docent::app {
 namespace {
@@ -263,6 +268,48 @@ TEST(LiveJoining, WithAJoinedMapThePartsInTheLibraryAreRemoved) {
        BeforeFrame(way.asked, JoinMap{"Hall"}), BeforeFrame(way.order.size() - 1, RemoveMap{"Annex"})});
   EXPECT_THAT(outcome.map_events, ::testing::Contains(HasSubstr("maps Annex and Hall were joined")));
   EXPECT_THAT(library.List(), IsEmpty());
+}
+
+// A signpost in the third map leads to the map that is joined into another one, and its model cannot be read.
+TEST(LiveJoining, KeepsContentOfAThirdMapThatCannotBeRead) {
+  const TemporaryFolder folder;
+  std::uint64_t attic = 0;
+  {
+    maps::Library library =
+        OpenLibrary(folder / "l.docent", maps::Access::kReadWrite, maps::CreateIfMissing::kYes);
+    content::Scene scene;
+    content::Entity sign;
+    sign.name = "sign-1";
+    sign.signpost.text = "downstairs";
+    sign.signpost.to_map = "Hall";
+    content::Entity fox;
+    fox.kind = content::Entity::Kind::kModel;
+    fox.name = "fox";
+    fox.model.asset = std::make_shared<content::Asset>(
+        content::ImportAsset(folder.Write("fox.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n")));
+    scene.entities = {sign, fox};
+    maps::MapRecord record;
+    record.key = attic = library.NewKey();
+    record.name = "Attic";
+    record.snapshot = maps::MakeSampleMap(attic, {.keyframes = 2, .points = 10});
+    record.scene = std::make_shared<maps::SceneRecord>(RecordFromScene(scene));
+    library.Save(record);
+  }
+  maps::RunSql(folder / "l.docent", "UPDATE assets SET data = zeroblob(length(data))");
+  maps::Library library = OpenLibrary(folder / "l.docent", maps::Access::kReadWrite);
+  const WayBack way;
+  const SourceRun outcome =
+      RunInOrder(Simulate("loop"), way.order, Pace::kLockstep, &library,
+                 {BeforeFrame(way.second, NewMap{"Annex"}), BeforeFrame(way.asked - 2, Save{}),
+                  BeforeFrame(way.asked, JoinMap{"Hall"})});
+  EXPECT_THAT(outcome.map_events, ::testing::Contains(HasSubstr("maps Annex and Hall were joined")));
+  const auto map = std::find_if(outcome.maps.begin(), outcome.maps.end(),
+                                [&](const Session::MapState& state) { return state.key == attic; });
+  ASSERT_NE(map, outcome.maps.end());
+  ASSERT_EQ(map->scene->entities.size(), 1u) << "the model was left out";
+  EXPECT_EQ(map->scene->entities[0].signpost.to_map, "Annex");
+  std::vector<std::string> lost;
+  EXPECT_THAT(library.LoadScene(attic, &lost).text, HasSubstr("fox"));
 }
 
 TEST(LiveJoining, SaysWhyMapsThatAPersonAskedForAreNotJoined) {
