@@ -65,7 +65,11 @@ void VisitRecorder::SetTour(const std::string& name, std::uint32_t stops, std::u
 
 // What follows the last pose is no loss: the visitor has left.
 std::optional<VisitRecord> VisitRecorder::Finish() {
-  if (visit_ && last_pose_s_) visit_->duration_s = *last_pose_s_;
+  if (visit_ && !last_pose_s_) {
+    visit_.reset();
+    is_unused_ = true;
+  }
+  if (visit_) visit_->duration_s = *last_pose_s_;
   return std::exchange(visit_, std::nullopt);
 }
 

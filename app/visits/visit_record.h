@@ -49,7 +49,8 @@ struct VisitRecord {
 };
 
 // Makes the records of one camera's visits from its images. A visit ends when nothing is recognized for two
-// minutes, and is none if nothing was recognized before; the next one begins with the next pose. One thread.
+// minutes, or by Finish, and is none if nothing was recognized before; the next one begins with the next
+// pose. One thread.
 class VisitRecorder {
  public:
   // Design choices.
@@ -71,7 +72,7 @@ class VisitRecorder {
                                  const Eigen::Vector3d& place);
   // How far the visitor has come along a tour.
   void SetTour(const std::string& name, std::uint32_t stops, std::uint32_t seen);
-  // Ends the visit; empty if there was no image since the last one ended.
+  // Ends the visit; empty if nothing was recognized since the last one ended.
   std::optional<VisitRecord> Finish();
 
  private:

@@ -105,6 +105,20 @@ TEST(VisitRecorder, ADeviceThatWaitsForItsFirstVisitorHasNone) {
   EXPECT_NEAR(visit->duration_s, 19.9, 1e-9);
 }
 
+TEST(VisitRecorder, AVisitThatIsEndedBeforeAnythingWasRecognizedIsNone) {
+  Walker walker;
+  walker.In("", 10);
+  EXPECT_FALSE(walker.recorder.Finish());
+  walker.In("", 10);
+  walker.In("Lions", 20);
+  const auto visit = walker.recorder.Finish();
+  ASSERT_TRUE(visit);
+  EXPECT_EQ(visit->begin, kNoon + std::chrono::seconds(20)) << "it begins with the first pose";
+  EXPECT_EQ(visit->images, 200u);
+  walker.In("", 10);
+  EXPECT_FALSE(walker.recorder.Finish());
+}
+
 TEST(VisitRecorder, StaysWithinItsLimits) {
   VisitRecorder::Limits limits;
   limits.stays = limits.losses = 5;
