@@ -9,7 +9,7 @@ RouteState::RouteState(Route route) : route_(std::move(route)), visits_(route_.s
   UpdateTarget();
 }
 
-void RouteState::Enter(std::uint64_t map_key, double seconds) {
+void RouteState::Enter(std::uint64_t map_key, double seconds, int camera) {
   if (map_key != last_) {
     const auto before = SignpostsFrom(last_), now = SignpostsFrom(map_key);
     is_passing_ = before && now && *now<*before&& * now> 0;
@@ -19,6 +19,7 @@ void RouteState::Enter(std::uint64_t map_key, double seconds) {
     entered_s_ = seconds;
   }
   last_s_ = seconds;
+  camera_ = camera;
   here_ = map_key;
   const std::optional<std::size_t> stop = StopOf(map_key);
   if (!stop) return;
@@ -26,6 +27,10 @@ void RouteState::Enter(std::uint64_t map_key, double seconds) {
   const bool is_later = visits_[*stop] == Visit::kAhead && FirstAhead() != stop;
   if (is_later && (is_passing_ || seconds - entered_s_ < kStay_s)) return;
   if (visits_[*stop] != Visit::kSeen || back_ == stop) Arrive(*stop);
+}
+
+void RouteState::Leave(double seconds, int camera) {
+  if (camera == camera_ || seconds - last_s_ > kPause_s) here_ = 0;
 }
 
 void RouteState::Arrive(std::size_t stop) {

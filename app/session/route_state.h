@@ -54,9 +54,11 @@ class RouteState {
 
   explicit RouteState(Route route);
 
-  // An image with a pose in the map of this key, and one without a pose. Times do not decrease.
-  void Enter(std::uint64_t map_key, double seconds);
-  void Leave() { here_ = 0; }
+  // An image of a camera with a pose in the map of this key, and one without a pose. Times do not decrease. A
+  // camera without a pose takes the visitor away only if no other one has had a pose since its own last one,
+  // or none for kPause_s.
+  void Enter(std::uint64_t map_key, double seconds, int camera = 0);
+  void Leave(double seconds = 0, int camera = 0);
   // Passes over the stop that the visitor is led to; on the way back to a stop, ends the way back. False if
   // no stop is left.
   bool Skip();
@@ -95,7 +97,8 @@ class RouteState {
   std::map<std::uint64_t, int> distances_;  // To the target, as SignpostGraph has them.
   std::uint64_t here_ = 0, last_ = 0;       // The map of the last image, if it had a pose; the last map.
   double entered_s_ = 0;     // When the visitor came to the last map, or was found there again.
-  double last_s_ = 0;        // The time of the last image with a pose.
+  double last_s_ = 0;        // The time of the last image with a pose,
+  int camera_ = 0;           // and its camera.
   bool is_passing_ = false;  // Whether the last map lies on the way to the target.
   bool is_finished_ = false;
   bool was_elsewhere_ = false;  // At another stop than the first, since the tour was finished.

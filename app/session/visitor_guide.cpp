@@ -80,9 +80,9 @@ std::string VisitorHint(const RejectionMessage& rejection, engine::Hint hint, co
 
 void VisitorGuide::FollowRoute(bool has_pose, ShownFrame* frame) {
   if (has_pose) {
-    route_->Enter(frame->tracked.map_key, frame->seconds);
+    route_->Enter(frame->tracked.map_key, frame->seconds, frame->tracked.frame.camera);
   } else if (!IsSkipped(*frame)) {
-    route_->Leave();
+    route_->Leave(frame->seconds, frame->tracked.frame.camera);
   }
   ui::VisitorDisplay& display = *frame->visitor;
   display.route_line = RouteLine(*route_, strings_);

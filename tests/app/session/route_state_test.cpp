@@ -83,6 +83,24 @@ TEST(RouteState, ArrivesOnceAtEachStop) {
   EXPECT_EQ(RouteLine(state), "Stop 1 of 3. Next: C");
 }
 
+TEST(RouteState, StaysAtAStopWhileOneOfTwoCamerasHasAPose) {
+  RouteState state(RouteWith(2));
+  state.Enter(1, 0, 0);
+  state.Leave(0.1, 1);
+  EXPECT_EQ(state.Here(), 0u);
+  EXPECT_FALSE(state.GoBack()) << "the visitor is at the first stop";
+  state.Enter(1, 0.2, 1);
+  state.Leave(0.3, 0);
+  EXPECT_EQ(state.Here(), 0u) << "the other camera has a pose now";
+  state.Leave(0.4, 1);
+  EXPECT_EQ(state.Here(), std::nullopt);
+  state.Enter(1, 5, 0);
+  state.Leave(5.9, 1);
+  EXPECT_EQ(state.Here(), 0u);
+  state.Leave(6.1, 1);
+  EXPECT_EQ(state.Here(), std::nullopt) << "the first camera has delivered no image since";
+}
+
 TEST(RouteState, DoesNotTakeTwoGlimpsesOfALaterStopForAStay) {
   RouteState state(RouteWith(3));
   state.Enter(1, 0);

@@ -63,6 +63,25 @@ TEST(VisitorGuide, SaysTheEndOfATourForAWhileInTheSentence) {
   EXPECT_EQ(sentence_at(10), "");
 }
 
+TEST(VisitorGuide, TheOtherCameraThatIsLostTakesNoVisitorAway) {
+  const auto simulation = Room(3);
+  Session session(Options(Pace::kLockstep, "Desk"), LensOf(*simulation), nullptr);
+  Route route;
+  route.stops = {{1, "Desk"}, {2, "Door"}};
+  RouteState state(route);
+  VisitorGuide first(&session, {"Desk", "Door"}, VisitorStringsFor("en"), &state),
+      second(&session, {"Desk", "Door"}, VisitorStringsFor("en"), &state);
+  const auto tracked = std::make_shared<ShownFrame>(), lost = std::make_shared<ShownFrame>();
+  tracked->tracked.state = engine::TrackingState::kSixDof;
+  tracked->tracked.map_key = 1;
+  tracked->shown.map_name = "Desk";
+  lost->tracked.state = engine::TrackingState::kLost;
+  lost->tracked.frame.camera = 1;
+  first.Guide(tracked, simulation->camera());
+  second.Guide(lost, simulation->camera());
+  EXPECT_EQ(state.Here(), 0u);
+}
+
 // A visitor at the first of two stops who looks at a label, with a machine that skips images.
 class VisitorWithSkippedImages : public ::testing::Test {
  protected:
