@@ -107,6 +107,7 @@ void SystemEventHandler::Handle(const engine::SystemEvent& event, const engine::
   }
   state_.AddEvent(event.time, "warning",
                   "the map " + found->second.name + " was not created, because it was never initialized");
+  state_.Retarget(event.map, found->second.name, 0, "");
   state_.maps.erase(found);
 }
 
@@ -121,7 +122,10 @@ void SystemEventHandler::Handle(const engine::SystemEvent& event, const engine::
   map.Discard();
   state_.AddEvent(event.time, "map",
                   "discarded " + map.name + ": " + ReasonOf(what, state_.NameOf(what.other)));
-  if (what.replacement == 0) return;
+  if (what.replacement == 0) {
+    state_.Retarget(event.map, map.name, 0, "");
+    return;
+  }
   state_.AddMap(what.replacement, map.name);
   state_.Retarget(event.map, map.name, what.replacement, map.name);
   // Content of the false initialization has lost its anchor.

@@ -143,6 +143,20 @@ TEST(Session, StartsAgainWithTheNextImageWhenTheFirstIsLost) {
   EXPECT_TRUE(ended->snapshot->keyframes[0].features->levels[0].empty()) << "its images are kept in memory";
 }
 
+TEST(Session, LeavesNoSignpostToAMapThatWasNeverInitialized) {
+  const auto simulation = Room(4);
+  Session session(Options(Pace::kLockstep, "Desk"), LensOf(*simulation), nullptr);
+  const Eigen::Vector2d pixel(320, 290);
+  const auto at_3_s = [](Command command) { return TimedCommand{FromSeconds(3), 1, std::move(command)}; };
+  Feed(simulation, Pace::kLockstep, &session,
+       {at_3_s(NewMap{"Annex"}), at_3_s(PlaceSignpost{"this way", pixel, "Annex"}), at_3_s(UseMap{"Desk"})});
+  const auto maps = session.Maps();
+  ASSERT_EQ(maps.size(), 1u) << "no image has started the other map";
+  ASSERT_EQ(maps[0].scene->entities.size(), 1u);
+  EXPECT_EQ(maps[0].scene->entities[0].signpost.to_key, 0u);
+  EXPECT_EQ(maps[0].scene->entities[0].signpost.to_map, "");
+}
+
 // One author's session in lockstep and the library that it saved; the tests do not change them.
 class AuthoredBay : public ::testing::Test {
  protected:
