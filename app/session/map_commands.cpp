@@ -121,7 +121,12 @@ void MapCommands::Apply(const JoinMap& command, const engine::TrackedFrame& fram
     throw Error("the map '" + from.name + "' is in use and cannot be joined now");
   for (const SessionMap* map : {&from, into}) {
     if (map->policy != maps::Policy::kOpen) throw Error(map->PolicyInWords() + "; it cannot be joined");
+    if (map->content_left_out)
+      throw Error("content of the map '" + map->name + "' is damaged and would be lost; it cannot be joined");
   }
+  // The current map may still get depth, and is compared then.
+  if (!from.snapshot->HasFinitePoints())
+    throw Error("the map '" + from.name + "' has no depth yet and cannot be joined");
   if (system_.ActiveMap() != into->key)
     throw Error("the map '" + into->name + "' is not being extended; continue it first");
   system_.JoinIntoActiveMap(from.key);

@@ -16,6 +16,7 @@
 #include "tests/app/support/simulated_session.h"
 #include "tests/app/support/temporary_folder.h"
 #include "tests/maps/map_samples.h"
+#include "tests/support/error_of.h"
 
 namespace docent::app {
 namespace {
@@ -270,9 +271,9 @@ TEST(LiveJoining, WithAJoinedMapThePartsInTheLibraryAreRemoved) {
   EXPECT_THAT(library.List(), IsEmpty());
 }
 
-// A signpost in the third map leads to the map that is joined into another one, and its model cannot be read.
-TEST(LiveJoining, KeepsContentOfAThirdMapThatCannotBeRead) {
-  const TemporaryFolder folder;
+// Makes the library l.docent with a map "Attic", whose signpost leads to a map "Hall" and whose model cannot
+// be read. Returns the key of the map.
+std::uint64_t SaveDamagedAttic(const TemporaryFolder& folder) {
   std::uint64_t attic = 0;
   {
     maps::Library library =
@@ -296,6 +297,12 @@ TEST(LiveJoining, KeepsContentOfAThirdMapThatCannotBeRead) {
     library.Save(record);
   }
   maps::RunSql(folder / "l.docent", "UPDATE assets SET data = zeroblob(length(data))");
+  return attic;
+}
+
+TEST(LiveJoining, KeepsContentOfAThirdMapThatCannotBeRead) {
+  const TemporaryFolder folder;
+  const std::uint64_t attic = SaveDamagedAttic(folder);
   maps::Library library = OpenLibrary(folder / "l.docent", maps::Access::kReadWrite);
   const WayBack way;
   const SourceRun outcome =
@@ -310,6 +317,21 @@ TEST(LiveJoining, KeepsContentOfAThirdMapThatCannotBeRead) {
   EXPECT_EQ(map->scene->entities[0].signpost.to_map, "Annex");
   std::vector<std::string> lost;
   EXPECT_THAT(library.LoadScene(attic, &lost).text, HasSubstr("fox"));
+}
+
+TEST(LiveJoining, RefusesMapsThatCannotBeJoined) {
+  const TemporaryFolder folder;
+  SaveDamagedAttic(folder);
+  maps::Library library = OpenLibrary(folder / "l.docent", maps::Access::kReadWrite);
+  library.Save({library.NewKey(), "Yard", maps::Policy::kOpen, nullptr, nullptr});
+  const auto simulation = Simulate("loop");
+  Session session(Options(Pace::kLockstep, "Hall"), LensOf(*simulation), &library);
+  Detour source(simulation, {0});
+  engine::Frame frame;
+  ASSERT_TRUE(source.Next(&frame));
+  const engine::TrackedFrame tracked = session.Process(frame);
+  EXPECT_THAT(ErrorOf([&] { session.Execute(JoinMap{"Attic"}, tracked); }), HasSubstr("is damaged"));
+  EXPECT_THAT(ErrorOf([&] { session.Execute(JoinMap{"Yard"}, tracked); }), HasSubstr("has no depth"));
 }
 
 TEST(LiveJoining, SaysWhyMapsThatAPersonAskedForAreNotJoined) {
