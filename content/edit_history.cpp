@@ -160,6 +160,18 @@ bool EditHistory::RetargetSignposts(const std::function<bool(Signpost*)>& retarg
   return any;
 }
 
+void EditHistory::AddSettings(const MapSettings& gained) {
+  for (std::vector<SceneChange>* const changes : {&done_, &undone_}) {
+    for (SceneChange& change : *changes) {
+      if (!change.settings) continue;
+      for (MapSettings* const state : {&change.settings->before, &change.settings->after}) {
+        if (!state->up) state->up = gained.up;
+        if (state->metres_per_unit == 0) state->metres_per_unit = gained.metres_per_unit;
+      }
+    }
+  }
+}
+
 std::set<std::string> EditHistory::Names() const {
   std::set<std::string> names;
   for (const auto* changes : {&done_, &undone_}) {

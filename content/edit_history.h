@@ -76,6 +76,10 @@ class EditHistory {
   // redo restore no target that is gone. `retarget` changes a signpost where it has to, and returns whether
   // it did. Returns whether it changed any.
   bool RetargetSignposts(const std::function<bool(Signpost*)>& retarget);
+  // Adds an up direction and a scale that the map has got by other means than a change to all stored settings
+  // that have none, so that undo and redo do not take them away. What `gained` does not have, and the
+  // entrance, stay as they are.
+  void AddSettings(const MapSettings& gained);
 
   const std::vector<SceneChange>& done() const { return done_; }
   const std::vector<SceneChange>& undone() const { return undone_; }

@@ -220,6 +220,10 @@ void SystemEventHandler::AbsorbMap(SessionMap* from, const engine::JoinedMap& jo
   auto scene = std::make_shared<content::Scene>(*into->scene);
   const maps::MapInfo map_into = IdentityOf(*into), map_from = IdentityOf(*from);
   MergeScene(*from->scene, map_into, map_from, joined, into->history.Names(), scene.get());
+  content::MapSettings gained = scene->settings;
+  if (into->scene->settings.up) gained.up.reset();
+  if (into->scene->settings.metres_per_unit != 0) gained.metres_per_unit = 0;
+  into->history.AddSettings(gained);
   into->scene = std::move(scene);
   into->history.RetargetSignposts([&](content::Signpost* signpost) {
     if (!LeadsTo(*signpost, map_into) && !LeadsTo(*signpost, map_from)) return false;

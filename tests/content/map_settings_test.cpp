@@ -95,6 +95,30 @@ TEST(MapSettings, ChangesAreUndoneAlsoAfterTheyWereStored) {
   EXPECT_EQ(scene.settings, Example());
 }
 
+TEST(MapSettings, ThatWereNotSetByAChangeStayWhenChangesAreUndoneAndRedone) {
+  Scene scene;
+  EditHistory history;
+  MapSettings settings;
+  settings.entrance = 7;
+  history.Do(SettingsEdit(scene, settings, "choose the entrance view"), &scene);
+  settings.up = Eigen::Vector3d::UnitY();
+  history.Do(SettingsEdit(scene, settings, "set the up direction"), &scene);
+  ASSERT_TRUE(history.Undo(&scene));
+  // As when another map is joined into this one.
+  scene.settings.up = Eigen::Vector3d::UnitX();
+  scene.settings.metres_per_unit = 0.5;
+  history.AddSettings(scene.settings);
+  ASSERT_TRUE(history.Undo(&scene));
+  EXPECT_FALSE(scene.settings.entrance);
+  EXPECT_EQ(scene.settings.up, Eigen::Vector3d(Eigen::Vector3d::UnitX()));
+  EXPECT_EQ(scene.settings.metres_per_unit, 0.5);
+  ASSERT_TRUE(history.Redo(&scene));
+  ASSERT_TRUE(history.Redo(&scene));
+  EXPECT_EQ(scene.settings.entrance, 7u);
+  EXPECT_EQ(scene.settings.up, Eigen::Vector3d(Eigen::Vector3d::UnitY())) << "the author's own one";
+  EXPECT_EQ(scene.settings.metres_per_unit, 0.5);
+}
+
 TEST(MapSettings, FollowAChangeOfTheMapsCoordinates) {
   // A quarter turn about z, and units of half the length.
   const engine::Sim3 motion{engine::Rotation3::Exp({0, 0, 0.5 * std::numbers::pi}), {1, 2, 3}, 2};

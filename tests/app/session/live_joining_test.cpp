@@ -258,6 +258,20 @@ TEST(LiveJoining, UndoRestoresNoSignpostThatLeadsToAMapThatWasJoined) {
   EXPECT_EQ(outcome.maps[0].scene->entities[0].signpost.to_key, 0u);
 }
 
+TEST(LiveJoining, UndoKeepsTheScaleThatCameWithTheOtherMap) {
+  const WayBack way;
+  const Eigen::Vector2d left(140, 120), right(180, 120);
+  const SourceRun outcome =
+      RunInOrder(Simulate("loop"), way.order, Pace::kLockstep, nullptr,
+                 {BeforeFrame(kSignInFirst, SetMapScale{left, right, 0.3}),
+                  BeforeFrame(way.second, NewMap{"Annex"}), BeforeFrame(way.asked - 4, SetMapEntrance{}),
+                  BeforeFrame(way.asked, JoinMap{"Hall"}), BeforeFrame(way.order.size() - 1, Undo{})});
+  EXPECT_THAT(outcome.map_events, ::testing::Contains(HasSubstr("maps Annex and Hall were joined")));
+  ASSERT_EQ(outcome.maps.size(), 1u) << ::testing::PrintToString(outcome.map_events);
+  EXPECT_FALSE(outcome.maps[0].scene->settings.entrance);
+  EXPECT_GT(outcome.maps[0].scene->settings.metres_per_unit, 0);
+}
+
 TEST(LiveJoining, WithAJoinedMapThePartsInTheLibraryAreRemoved) {
   const TemporaryFolder folder;
   maps::Library library =
