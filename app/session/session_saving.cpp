@@ -131,10 +131,13 @@ void SessionSaving::ReportFailure(Timestamp time) {
 bool SessionSaving::FlushToLibrary(std::uint64_t key, const std::string& name, Timestamp time,
                                    std::unique_lock<std::mutex>* lock) {
   if (!saver_) return false;
-  lock->unlock();
-  saver_->InterruptMaintenance();  // it may write the map as it was
-  saver_->Flush();
-  lock->lock();
+  // Before the lock is taken again, the thread of another camera may submit something.
+  do {
+    lock->unlock();
+    saver_->InterruptMaintenance();  // it may write the map as it was
+    saver_->Flush();
+    lock->lock();
+  } while (saver_->pending() > 0);
   ReportFailure(time);
   const SessionMap* const map = state_.FindMap(key);
   if (map == nullptr || !map->Exists())

@@ -58,8 +58,9 @@ class SessionSaving {
   void Autosave(Timestamp time);
   // A failed save becomes a warning, and everything that it may not have written is saved again.
   void ReportFailure(Timestamp time);
-  // Waits until the library holds all changes of the map that were submitted; returns whether it has the map.
-  // Releases the lock meanwhile. Throws Error if the map exists no longer after that.
+  // Waits until the library holds all changes of the map that were submitted, and nothing waits for the disk;
+  // returns whether it has the map. Releases the lock meanwhile. Throws Error if the map exists no longer
+  // after that.
   bool FlushToLibrary(std::uint64_t key, const std::string& name, Timestamp time,
                       std::unique_lock<std::mutex>* lock);
   // Maintenance gives way, because something else needs its map or its time.

@@ -3,6 +3,12 @@
 
 #include <gmock/gmock.h>
 
+#include <atomic>
+#include <chrono>
+#include <future>
+#include <mutex>
+#include <thread>
+
 #include "app/session/library_scene.h"
 #include "tests/app/support/simulated_session.h"
 #include "tests/app/support/temporary_folder.h"
@@ -111,6 +117,36 @@ TEST_F(SavingSession, AFailedSaveIsReportedWithoutAutomaticSavingToo) {
   }
   EXPECT_THAT(Warnings(), ElementsAre(HasSubstr("map 'Attic'")));
   EXPECT_TRUE(saving_.Status().unsaved);
+}
+
+// What a command does in the library next must not be undone by a save.
+TEST_F(SavingSession, ACommandWaitsAlsoForWhatAnotherThreadSubmitsMeanwhile) {
+  std::atomic<int> saved = 0;
+  std::promise<void> first_is_saved, mutex_is_taken;
+  options_.on_saved = [&] {
+    if (++saved > 1) return;
+    first_is_saved.set_value();
+    mutex_is_taken.get_future().wait();
+  };
+  std::thread other([&] {
+    first_is_saved.get_future().wait();
+    const std::scoped_lock lock(mutex_);
+    mutex_is_taken.set_value();
+    saving_.Flush();  // The first save does not need the mutex any more.
+    // Meanwhile the first thread comes to wait for the mutex; if it is late, it finds what was submitted
+    // anyway.
+    std::this_thread::sleep_for(std::chrono::milliseconds(200));
+    saving_.SaveMap(state_.FindByName("Yard"), {});
+  });
+  {
+    std::unique_lock lock(mutex_);
+    SessionMap* const hall = state_.FindByName("Hall");
+    saving_.SaveMap(hall, {});
+    EXPECT_TRUE(saving_.FlushToLibrary(hall->key, "Hall", {}, &lock));
+    EXPECT_EQ(saved.load(), 2);
+  }
+  other.join();
+  saving_.Flush();
 }
 
 }  // namespace
