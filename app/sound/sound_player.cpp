@@ -55,27 +55,33 @@ std::optional<SoundDirector::Orders> SoundPlayer::Next(const std::stop_token& st
 void SoundPlayer::Run(const std::stop_token& stop) {
   std::unique_ptr<SoundDevice> device;
   std::chrono::steady_clock::time_point next_try{};
+  // A damaged file costs only its own sound.
+  const auto guarded = [this](const auto& action) {
+    try {
+      action();
+    } catch (const Error& error) {
+      Report(error.what());
+    }
+  };
   while (!stop.stop_requested()) {
     const auto orders = Next(stop);
-    try {
+    guarded([&] {
       if (device && !device->is_connected()) {
         device.reset();
         Report("the sound device was lost");
       }
-      if (device) device->Update();
-      if (!orders) continue;
+      if (device) guarded([&] { device->Update(); });
+      if (!orders) return;
       const auto now = std::chrono::steady_clock::now();
       if (!device && !orders->start.empty() && now >= next_try) {
         next_try = now + retry_;
         device = std::make_unique<SoundDevice>();
         next_try = {};
       }
-      if (!device) continue;
+      if (!device) return;
       for (const SoundDirector::Key& key : orders->stop) device->Stop(key);
-      for (const auto& [key, asset] : orders->start) device->Start(key, asset);
-    } catch (const Error& error) {
-      Report(error.what());
-    }
+      for (const auto& start : orders->start) guarded([&] { device->Start(start.first, start.second); });
+    });
   }
 }
 

@@ -5,6 +5,9 @@
 #include <stdlib.h>
 
 #include <chrono>
+#include <cstdint>
+#include <cstdlib>
+#include <cstring>
 #include <filesystem>
 #include <fstream>
 #include <functional>
@@ -39,13 +42,15 @@ class SoundPlayerOfAFile : public ::testing::Test {
     }
     std::filesystem::remove_all(folder_ / "device");
   }
-  void Play(const std::string& name) {
+  static std::shared_ptr<const content::Asset> LongTone() {
     constexpr int kWaveRate = 48'000;
+    return std::make_shared<content::Asset>(content::AssetFromBytes(
+        "tone",
+        content::SoundBytesOf(SF_FORMAT_WAV | SF_FORMAT_PCM_16, 1, kWaveRate, std::size_t{20} * kWaveRate)));
+  }
+  void Play(const std::string& name) {
     SoundDirector::Orders orders;
-    orders.start.emplace_back(SoundDirector::Key{1, name},
-                              std::make_shared<content::Asset>(content::AssetFromBytes(
-                                  "tone", content::SoundBytesOf(SF_FORMAT_WAV | SF_FORMAT_PCM_16, 1,
-                                                                kWaveRate, std::size_t{20} * kWaveRate))));
+    orders.start.emplace_back(SoundDirector::Key{1, name}, LongTone());
     player_.Give(orders);
   }
   std::string WaitForProblem() {
@@ -58,6 +63,21 @@ class SoundPlayerOfAFile : public ::testing::Test {
       std::error_code error;
       const auto size = std::filesystem::file_size(folder_ / "device" / "heard.wav", error);
       return !error && size > 20'000;
+    });
+  }
+
+  // Silence is written too.
+  bool IsToneHeard() {
+    return Wait([this] {
+      const std::string bytes = ReadAll(folder_ / "device" / "heard.wav");
+      const std::size_t header = bytes.find("data");
+      if (header == std::string::npos) return false;
+      for (std::size_t at = header + 8; at + 1 < bytes.size(); at += 2) {
+        std::int16_t sample = 0;
+        std::memcpy(&sample, bytes.data() + at, sizeof(sample));
+        if (std::abs(sample) > 1000) return true;
+      }
+      return false;
     });
   }
 
@@ -81,6 +101,16 @@ TEST_F(SoundPlayerOfAFile, PlaysALaterSoundWithADeviceThatWasMissing) {
   std::filesystem::create_directory(folder_ / "device");
   Play("second");
   EXPECT_TRUE(IsHeard());
+}
+
+TEST_F(SoundPlayerOfAFile, PlaysASoundThatBeginsTogetherWithADamagedOne) {
+  std::filesystem::create_directory(folder_ / "device");
+  SoundDirector::Orders orders;
+  orders.start.emplace_back(SoundDirector::Key{1, "damaged"}, std::make_shared<content::Asset>());
+  orders.start.emplace_back(SoundDirector::Key{1, "tone"}, LongTone());
+  player_.Give(orders);
+  EXPECT_TRUE(IsToneHeard());
+  EXPECT_THAT(WaitForProblem(), HasSubstr("Sounds are not heard"));
 }
 
 TEST_F(SoundPlayerOfAFile, PlaysALaterSoundAfterItsDeviceWasLost) {
