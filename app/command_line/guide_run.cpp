@@ -386,7 +386,10 @@ void GuideRun::HandleTrouble(const std::string& sentence, Timestamp time, const 
   {
     const std::scoped_lock lock(files_mutex_);
     frame->serial = ++serial_;
-    if (host_) visitor_frames_.SetLast(frame);
+    if (host_) {
+      visitor_frames_.SetTrouble(CameraOf(frame->tracked), sentence);
+      visitor_frames_.SetLast(frame);
+    }
   }
   show(std::move(frame));
 }

@@ -23,8 +23,12 @@ void VisitorFrames::Clear() {
 
 void VisitorFrames::Answer(const std::string& refusal, ShownFrame* frame) {
   Camera& camera = cameras_[CameraOf(frame->tracked)];
-  if (frame->message == camera.refusal) frame->message.clear();
-  if (!refusal.empty()) frame->message = refusal;
+  if (!camera.trouble.empty()) {
+    frame->message = refusal.empty() ? camera.trouble : camera.trouble + " " + refusal;
+  } else {
+    if (frame->message == camera.refusal) frame->message.clear();
+    if (!refusal.empty()) frame->message = refusal;
+  }
   camera.refusal = refusal;
   camera.is_answer_new = true;
 }

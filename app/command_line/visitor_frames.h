@@ -25,7 +25,10 @@ class VisitorFrames {
   // Nothing is shown again.
   void Clear();
 
+  // Why the camera delivers no images, as a sentence; empty once it does again.
+  void SetTrouble(std::size_t camera, const std::string& trouble) { cameras_[camera].trouble = trouble; }
   // Replaces the answer that a frame shows to a visitor's last step: why it was refused; empty if it was not.
+  // The trouble with the camera stays before it: without it, nothing would explain the image that stays.
   void Answer(const std::string& refusal, ShownFrame* frame);
   // The last answer, if it has not been taken since.
   std::optional<std::string> TakeAnswer(std::size_t camera);
@@ -43,6 +46,7 @@ class VisitorFrames {
     std::shared_ptr<const ShownFrame> last;
     std::string refusal;  // Why the visitor's last step was not carried out; empty if it was.
     bool is_answer_new = false;
+    std::string trouble = {};                     // See SetTrouble.
     std::optional<engine::Frame> untracked = {};  // The image of the last call of Over.
   };
   std::vector<Camera> cameras_;

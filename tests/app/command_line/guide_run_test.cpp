@@ -3,8 +3,10 @@
 
 #include <gmock/gmock.h>
 
+#include <functional>
 #include <memory>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "engine/base/error.h"
@@ -14,6 +16,7 @@
 namespace docent::app {
 namespace {
 
+using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 using ::testing::Not;
 
@@ -79,6 +82,50 @@ TEST(GuideRun, LogsTheWarningsOfATourOnce) {
   const std::string warning = "The calibration of camera \"lens\"";
   EXPECT_THAT(end.log, HasSubstr(warning));
   EXPECT_THAT(end.log.substr(end.log.find(warning) + 1), Not(HasSubstr(warning)));
+}
+
+// A camera that is unplugged after its first image. `away` is called meanwhile; then there is no other image.
+class UnpluggedCamera : public FrameSource {
+ public:
+  explicit UnpluggedCamera(std::function<void()> away) : away_(std::move(away)) {
+    info_.name = "unplugged";
+    info_.live = true;
+    info_.known_camera =
+        engine::CameraModel(engine::LensModel::kRadialTangential, {640, 480, 500, 500, 320, 240}, {});
+  }
+  bool Next(engine::Frame* frame) override {
+    ++calls_;
+    frame->index = 1;
+    frame->time = Timestamp(1000);
+    if (calls_ == 1) frame->image = cv::Mat::zeros(480, 640, CV_8UC1);
+    if (calls_ == 3) away_();
+    return calls_ < 3;
+  }
+  std::string trouble() const override { return calls_ < 2 ? "" : "The camera was unplugged."; }
+
+ private:
+  const std::function<void()> away_;
+  int calls_ = 0;
+};
+
+TEST(GuideRun, SaysThatTheCameraIsAwayWhateverTheVisitorDoes) {
+  GuideRun* run = nullptr;
+  std::vector<std::string> messages;
+  std::vector<CalibratedCamera> cameras;
+  cameras.push_back(
+      Calibrate(std::make_unique<UnpluggedCamera>([&] {
+                  for (const auto step : {GuideVisitor::Step::kPress, GuideVisitor::Step::kClose}) {
+                    const auto frame = run->Lead(0, GuideVisitor{step, {}});
+                    messages.push_back(frame ? frame->message : "no frame");
+                  }
+                }),
+                std::nullopt));
+  const GuideRequest request = HeadlessRequest();
+  GuideRun tour(request, cameras);
+  run = &tour;
+  tour.Run([](const std::shared_ptr<const ShownFrame>&) {}, {});
+  EXPECT_THAT(messages, ElementsAre("The camera was unplugged. There is nothing to open here.",
+                                    "The camera was unplugged."));
 }
 
 }  // namespace
