@@ -136,7 +136,8 @@ void CameraFeed::Pause(const std::stop_token& stop) {
 void CameraFeed::CarryOut(Timestamp passed, bool at_end) {
   if (!run_.options.idle || !last_tracked_) return;
   command_runner_.RunDue(last_tracked_->frame.time - *first_time_, *last_tracked_);
-  session_->Idle(last_tracked_->frame.time + passed);
+  // The last images of several cameras may be far apart, and the times of a session do not decrease.
+  if (!at_end || run_.options.camera == 0) session_->Idle(last_tracked_->frame.time + passed);
   run_.options.idle(*last_tracked_, at_end);
 }
 

@@ -59,7 +59,8 @@ class CameraFeed {
   void Handle(const std::stop_token& stop);
   // Goes on with the last image while the clock is stopped.
   void Pause(const std::stop_token& stop);
-  // Carries out what the person wants while there is no other image, `passed` after the last one.
+  // Carries out what the person wants while there is no other image, `passed` after the last one. At the end,
+  // the session's time is that of the first camera.
   void CarryOut(Timestamp passed, bool at_end);
   // Carries out what the person wanted since the last image: while images are dropped or missing, and after
   // the last one. waits: for files that have to be read.

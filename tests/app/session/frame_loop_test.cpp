@@ -506,6 +506,50 @@ TEST(FrameLoop, PausesWhileTheClockIsStoppedAndStaysAtTheLastImage) {
       << "commands are carried out meanwhile";
 }
 
+TEST(FrameLoop, SavesNoMoreOftenAtTheEndWhereAnotherRecordingIsShorter) {
+  const auto simulation = simulated_session::Room(4);
+  const TemporaryFolder folder;
+  maps::Library library =
+      maps::Library::Open(folder / "l.docent", maps::Access::kReadWrite, maps::CreateIfMissing::kYes);
+  SessionOptions options = simulated_session::Options(Pace::kLockstep, "Bay");
+  options.autosave_interval = std::chrono::seconds(1);
+  CalibratedCamera camera = simulated_session::CameraOf(simulation);
+  CalibratedCamera shorter = Calibrate(std::make_unique<Recording>(3), std::nullopt);
+  Session session(options, {camera.model, shorter.model}, &library);
+  CommandInbox inbox;
+  std::stop_source stopping;
+  std::chrono::steady_clock::time_point begin;
+  int turns = 0;
+  std::vector<CameraRun> runs(2);
+  for (CameraRun& run : runs) {
+    run.options.pace = Pace::kLockstep;
+    run.options.stays = true;
+    run.options.idle = [](const engine::TrackedFrame&, bool) {};
+    run.shown = [](const engine::TrackedFrame&) {};
+  }
+  runs[0].camera = &camera;
+  runs[1].camera = &shorter;
+  runs[1].options.camera = 1;
+  runs[0].options.script.push_back({std::chrono::seconds(3), 1, PlaceSignpost{"here", {320, 290}, ""}});
+  runs[0].options.inbox = &inbox;
+  runs[0].options.idle = [&](const engine::TrackedFrame&, bool at_end) {
+    if (!at_end) return;
+    if (++turns == 1) {
+      session.TakeEvents();
+      begin = std::chrono::steady_clock::now();
+    }
+    inbox.Push({SetEntityText{"sign-1", std::to_string(turns)}, nullptr});
+    if (turns == 30) stopping.request_stop();
+  };
+  RunCameras(runs, &session, stopping.get_token());
+  const double passed_s = ToSeconds(std::chrono::steady_clock::now() - begin);
+  EXPECT_EQ(turns, 30);
+  int saves = 0;
+  for (const Event& event : session.TakeEvents()) saves += event.event == "save";
+  EXPECT_LE(saves, 2 + passed_s) << "one a second, although there is something to save each time";
+  session.Finish();
+}
+
 TEST(PausableClock, JumpsToWhatIsWaitedForDuringFastForward) {
   PausableClock clock;
   const Timestamp begin = clock.Now();
