@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "app/cameras/file_sources.h"
 
+#include <spdlog/spdlog.h>
+
 #include <algorithm>
 #include <cmath>
 #include <opencv2/videoio.hpp>
@@ -45,7 +47,8 @@ class VideoSource : public FrameSource {
     }
     const double fps = capture_.get(cv::CAP_PROP_FPS);
     if (std::isfinite(fps) && fps > 0 && fps < 10000) info_.nominal_fps = fps;
-    const double count = capture_.get(cv::CAP_PROP_FRAME_COUNT);  // Only an estimate in some containers.
+    // Only an estimate in some containers; images that were trimmed but are still in the file count too.
+    const double count = capture_.get(cv::CAP_PROP_FRAME_COUNT);
     if (std::isfinite(count) && count >= 1 && count < 1e9) announced_count_ = count;
     if (timestamps_path) {
       std::vector<Timestamp> used;
@@ -139,9 +142,12 @@ class VideoSource : public FrameSource {
     const double fps = capture_.get(cv::CAP_PROP_FPS);
     const double missing_s = *announced_count_ / fps - ToSeconds(last_time_ + step_);
     const double allowed = std::max(2.0, 0.01 * *announced_count_);
-    if (missing > allowed && missing_s > allowed / fps) {
-      throw Error(Quoted(path_) + " is truncated at image " + std::to_string(index_) + " of the " +
-                  std::to_string(static_cast<std::uint64_t>(*announced_count_)) + " stated in its header.");
+    // The decoder does not tell a file that was cut off from one whose edit list hides the missing images.
+    if (missing > allowed && missing_s > allowed / fps && IsFirstWarning(path_)) {
+      spdlog::warn(
+          "{} ends after image {} of the {} that its header states: it was cut off, or trimmed without "
+          "encoding it anew.",
+          Quoted(path_), index_, static_cast<std::uint64_t>(*announced_count_));
     }
   }
 

@@ -14,7 +14,8 @@ namespace docent::app {
 
 // Opens a video. With `timestamps_path`, the timestamps come from that file, one for each image; a different
 // number of images and timestamps is an Error at the image where it is detected. Without it, the timestamps
-// come from the container, and a video that ends well before its stated length is reported as truncated.
+// come from the container, and a warning says if the video ends well before the length that its header
+// states.
 std::unique_ptr<FrameSource> OpenVideo(const std::filesystem::path& video,
                                        const std::optional<std::filesystem::path>& timestamps_path = {});
 

@@ -19,9 +19,11 @@ namespace docent::app {
 
 // Properties of a source that are known before its first image.
 struct SourceInfo {
-  std::string name;                          // Name of the folder or file, for messages and reports.
-  bool live = false;                         // A device, which delivers images at its own rate without end.
-  std::optional<std::uint64_t> frame_count;  // Empty if it is unknown or has no end.
+  std::string name;   // Name of the folder or file, for messages and reports.
+  bool live = false;  // A device, which delivers images at its own rate without end.
+  // Empty if it is unknown or has no end. Of a video without times, what its header states, which can be more
+  // than it has.
+  std::optional<std::uint64_t> frame_count;
   // Time from the first to the last image; empty if it is not known before the images are read.
   std::optional<Timestamp> duration;
   double nominal_fps = 30;                                 // Images per second, positive.

@@ -23,14 +23,6 @@ std::string At(const fs::path& path, int line) {
   return "'" + path.string() + "', line " + std::to_string(line);
 }
 
-// Whether nothing was said of this list so far: an evaluation opens a recording for each run.
-bool IsFirstWarning(const fs::path& path) {
-  static std::mutex mutex;
-  static std::set<fs::path> warned;
-  const std::scoped_lock lock(mutex);
-  return warned.insert(path).second;
-}
-
 // Decides which images of a list are used: those whose time is later than that of every image before them. A
 // recorder that stamps two images alike spoils no recording, but a list that is mostly out of order is wrong.
 class TimeFilter {
@@ -126,6 +118,13 @@ void CheckOneSequence(const fs::path& folder, const std::vector<fs::path>& image
 }
 
 }  // namespace
+
+bool IsFirstWarning(const fs::path& path) {
+  static std::mutex mutex;
+  static std::set<fs::path> warned;
+  const std::scoped_lock lock(mutex);
+  return warned.insert(path).second;
+}
 
 std::optional<fs::path> FindEurocCamera(const fs::path& folder) {
   for (const char* below : {"mav0/cam0", "cam0", "."}) {

@@ -39,6 +39,10 @@ std::vector<std::optional<Timestamp>> ReadTimestamps(const std::filesystem::path
 // The folder of an EuRoC camera (the one with data.csv), or empty.
 std::optional<std::filesystem::path> FindEurocCamera(const std::filesystem::path& folder);
 
+// True when it is called for the first time with this path. An evaluation opens a recording for each run, but
+// a warning about a file is given only once. Any thread.
+bool IsFirstWarning(const std::filesystem::path& path);
+
 // Frame rate (images per second) from the median interval; 30 for fewer than two times.
 double MedianFps(const std::vector<Timestamp>& times);
 

@@ -239,6 +239,24 @@ TEST_F(Cameras, ReportAVideoThatIsLongerThanItsList) {
   EXPECT_THAT(ErrorOfReading(), AllOf(HasSubstr("has 2 times"), HasSubstr("has more images")));
 }
 
+// As after `ffmpeg -t 0.4 -c copy`: the edit list hides images that stay in the file and count in its header.
+TEST_F(Cameras, ReadATrimmedVideoToItsEndAndWarnOnce) {
+  WriteVideo(folder_ / "whole.mp4", 20);
+  std::string bytes = ReadAll(folder_ / "whole.mp4");
+  const std::size_t edits = bytes.rfind("elst");
+  ASSERT_NE(edits, std::string::npos);
+  // The duration of the first edit in milliseconds follows the type, version and flags, and the number of
+  // edits.
+  folder_.Write("cut.mp4", bytes.replace(edits + 12, 4, std::string("\0\0\x01\x90", 4)));
+  const std::string cut = (folder_ / "cut.mp4").string();
+  std::vector<engine::Frame> frames;
+  const std::string log = LogOf([&] { frames = ReadFrames(OpenCamera(cut).get()); });
+  ASSERT_EQ(frames.size(), 10u);
+  EXPECT_NEAR(ToSeconds(frames.back().time), 0.36, 1e-6);
+  EXPECT_THAT(log, AllOf(HasSubstr("cut.mp4' ends after image 10 of the 20"), HasSubstr("trimmed")));
+  EXPECT_EQ(LogOf([&] { ReadFrames(OpenCamera(cut).get()); }), "");
+}
+
 TEST_F(Cameras, ReportATruncatedVideoThatCannotBeOpened) {
   WriteVideo(folder_ / "whole.mp4", 20);
   const std::string bytes = ReadAll(folder_ / "whole.mp4");
