@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <optional>
+#include <string>
 #include <utility>
 
 #include "app/files/text_file.h"
@@ -99,15 +100,25 @@ class WindowSource : public FrameSource {
  private:
   template <typename Fetch>
   bool NextInside(engine::Frame* frame, const Fetch& fetch) {
-    for (; skipped_ < first_frame_ && !ended_; ++skipped_) ended_ = !source_->NextLate(frame);
     if (ended_) return false;
+    for (; skipped_ < first_frame_; ++skipped_) {
+      if (!source_->NextLate(frame)) RefuseStart();
+    }
     *frame = engine::Frame();  // Discards data of the skipped images.
     ended_ = !fetch();
+    if (ended_ && !begin_) RefuseStart();
     if (ended_) return false;
     if (!begin_) begin_ = {frame->time, frame->index};
     ended_ = duration_ > Timestamp{} && frame->time - begin_->first >= duration_;
     frame->index -= begin_->second;
     return !ended_;
+  }
+
+  // Only its end tells how many images a video without times has.
+  [[noreturn]] void RefuseStart() {
+    ended_ = true;
+    throw Error("No window can begin at image " + std::to_string(first_frame_) + " of '" + info_.name +
+                "', counted from 0, because it has only " + std::to_string(skipped_) + " images.");
   }
 
   std::unique_ptr<FrameSource> source_;

@@ -14,7 +14,8 @@ namespace docent::app {
 std::unique_ptr<FrameSource> ClipSource(std::unique_ptr<FrameSource> source, Timestamp from, Timestamp until);
 
 // Delivers the images of a recorded source as if the recording began at image `first_frame` (from 0), for
-// less than `duration`, or to the end if `duration` is zero. Timestamps are unchanged; indices begin at 0.
+// less than `duration`, or to the end if `duration` is zero. Timestamps are unchanged; indices begin at 0. If
+// there is no such image, Next throws Error when all images have been read.
 std::unique_ptr<FrameSource> WindowOf(std::unique_ptr<FrameSource> source, std::uint64_t first_frame,
                                       Timestamp duration);
 

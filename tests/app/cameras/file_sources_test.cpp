@@ -455,7 +455,17 @@ TEST_F(Cameras, CanBeginAtAnyImageAsIfItWereTheFirst) {
   EXPECT_EQ(ReadFrames(window(6, 200).get()).size(), 2u) << "the end is exclusive";
   EXPECT_EQ(ReadFrames(window(0, 250).get()).size(), 3u);
   EXPECT_EQ(ReadFrames(window(8, 5000).get()).size(), 2u);
-  EXPECT_TRUE(ReadFrames(window(10, 0).get()).empty());
+}
+
+TEST_F(Cameras, RefuseAWindowThatBeginsBeyondTheirEnd) {
+  WriteVideo(folder_ / "video.mp4", 4);
+  for (const std::uint64_t first : {4u, 9u}) {
+    const auto source = WindowOf(OpenCamera((folder_ / "video.mp4").string()), first, {});
+    EXPECT_THAT(ErrorOf([&] { ReadFrames(source.get()); }),
+                AllOf(HasSubstr("at image " + std::to_string(first) + " of 'video.mp4'"),
+                      HasSubstr("it has only 4 images")));
+    EXPECT_TRUE(ReadFrames(source.get()).empty()) << "it stays at its end";
+  }
 }
 
 TEST_F(Cameras, KeepTheirHeadWhenClipped) {
