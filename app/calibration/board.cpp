@@ -203,7 +203,9 @@ BoardView BoardDetector::DetectCheckerboard(const cv::Mat& grey, bool thorough) 
   std::vector<std::optional<Eigen::Vector2d>> guesses;
   for (const cv::Point2f& corner : corners) guesses.emplace_back(Eigen::Vector2d(corner.x, corner.y));
   constexpr double kWholeSquare = 0.5;
-  return Refine(grey, guesses, board_.columns, kWholeSquare);
+  BoardView view = Refine(grey, guesses, board_.columns, kWholeSquare);
+  // Corners of a single row determine no pose; half of all corners never lie in one row.
+  return 2 * view.pixels.size() < guesses.size() ? BoardView() : view;
 }
 
 BoardView BoardDetector::DetectCharuco(const cv::Mat& grey) const {

@@ -50,7 +50,8 @@ struct BoardView {
 };
 
 // Detects the board's corners with subpixel accuracy: a checkerboard only when all of it is in the image, a
-// ChArUco board also when it is partly hidden. The view has no points when no board is found. Any thread.
+// ChArUco board also when it is partly hidden. The view has no points when no board is found, or too few of
+// its corners can be refined to determine the pose of the board. Any thread.
 class BoardDetector {
  public:
   explicit BoardDetector(const BoardSpec& board);

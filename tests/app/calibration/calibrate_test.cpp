@@ -3,6 +3,7 @@
 
 #include <gmock/gmock.h>
 
+#include <cmath>
 #include <fstream>
 #include <opencv2/calib3d.hpp>
 #include <opencv2/imgcodecs.hpp>
@@ -189,6 +190,31 @@ TEST(Boards, ParseValidTextAndRejectInvalidText) {
                            "charuco:8x6:0", "charuco:8x6:nan", "checkerboard:9x-6:20"}) {
     EXPECT_THAT(ErrorOf([&] { ParseBoard(text); }), HasSubstr("calibration board")) << text;
   }
+}
+
+// The contrast rises from left to right, so that corners of the last columns alone can be refined.
+TEST(Boards, AreNotFoundWhereMostCornersCannotBeRefined) {
+  const BoardSpec board;
+  const cv::Mat sheet = PaintBoard(board, 40);
+  Random random(5);
+  cv::Mat image(sheet.size(), CV_8UC1);
+  const auto paint = [&](double left_contrast, double right_contrast) {
+    for (int y = 0; y < image.rows; ++y) {
+      for (int x = 0; x < image.cols; ++x) {
+        const double contrast = left_contrast + (right_contrast - left_contrast) * x / image.cols;
+        const double brightness = 110 + contrast * (sheet.at<uchar>(y, x) / 127.5 - 1);
+        image.at<uchar>(y, x) = static_cast<uchar>(std::lround(brightness + random.Uniform(-0.5, 0.5)));
+      }
+    }
+  };
+  const BoardDetector detector(board);
+  paint(8, 11);
+  EXPECT_EQ(detector.Detect(image).pixels.size(), 54u) << "all corners have enough contrast";
+  paint(4, 7);
+  std::vector<cv::Point2f> corners;
+  ASSERT_TRUE(
+      cv::findChessboardCornersSB(image, {board.columns, board.rows}, corners, cv::CALIB_CB_NORMALIZE_IMAGE));
+  EXPECT_TRUE(detector.Detect(image).pixels.empty());
 }
 
 TEST(Boards, AreWrittenAsPdf) {
