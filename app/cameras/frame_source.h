@@ -90,6 +90,10 @@ struct DeviceFormat {
   std::uint32_t pixel_format = 0;   // V4L2 FourCC.
 };
 
+// Value of CameraOptions::lock_controls_after: one second at 30 images/s, after which automatic exposure has
+// settled.
+inline constexpr int kImagesUntilSettled = 30;
+
 // How a source is opened. Fields for other kinds of sources are ignored.
 struct CameraOptions {
   DeviceFormat device_format;                      // Devices only.

@@ -141,6 +141,7 @@ void RunCalibrate(const CalibrateOptions& options, Verbosity verbosity) {
   const Interruption interruption;
   CameraOptions camera = options.camera;
   camera.reconnect = !options.headless;
+  camera.lock_controls_after = kImagesUntilSettled;  // Automatic focus would change the lens between views.
   const auto source = OpenCamera(options.source, camera);
   // A file that cannot be written must not cost the views that a person has collected.
   if (std::filesystem::is_directory(options.output))

@@ -159,7 +159,7 @@ std::vector<CalibratedCamera> OpenArgumentCameras(const RunArguments& run) {
   CameraOptions options = run.cameras.options;
   options.seed = run.seed;
   options.reconnect = true;
-  options.lock_controls_after = 30;  // One second at 30 images/s, after which automatic exposure has settled.
+  options.lock_controls_after = kImagesUntilSettled;
   std::vector<CalibratedCamera> cameras;
   for (std::size_t i = 0; i < run.cameras.sources.size(); ++i) {
     auto source = OpenCamera(run.cameras.sources[i], options);
