@@ -86,7 +86,8 @@ std::optional<std::string> SimulationOptions::Validate() const {
     return "The frame rate must be above 0 and at most 1000 Hz.";
   if (!(duration_s >= 0 && duration_s <= kLongestDuration_s))
     return "The duration must be from 0 s to one day.";
-  if (!(exposure_s >= 0 && exposure_s * frame_rate_hz <= 1)) {
+  // Without motion blur, the exposure time is not used.
+  if (!(exposure_s >= 0 && (blur_samples == 1 || exposure_s * frame_rate_hz <= 1))) {
     return "The exposure time must be from 0 s to the time between two frames.";
   }
   if (blur_samples < 1 || blur_samples > 64) return "The number of motion blur samples must be from 1 to 64.";

@@ -31,8 +31,10 @@ struct SimulationOptions {
   // lens.
   double field_of_view_deg = 0;
   double frame_rate_hz = 30;
-  double duration_s = 0;         // Maximum duration; 0: the whole trajectory of the scene.
-  double exposure_s = 1.0 / 60;  // The timestamp of an image is the middle of its exposure.
+  double duration_s = 0;  // Maximum duration; 0: the whole trajectory of the scene.
+  // At most the time between two frames; not used without motion blur. The timestamp of an image is the
+  // middle of its exposure.
+  double exposure_s = 1.0 / 60;
   int blur_samples = 1;          // Renderings averaged over the exposure; 1: no motion blur.
   double noise_sigma = 1.5;      // Of each channel, grey levels of 255; typical for a webcam indoors.
   double exposure_drift = 0.04;  // Amplitude of the slow drift of the logarithm of the gain.

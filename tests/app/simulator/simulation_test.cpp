@@ -434,6 +434,12 @@ TEST(Simulation, ReportsTheValidNumbersOfAScene) {
   EXPECT_NE(ErrorOfScene("grass:1"), "");
 }
 
+TEST(Simulation, AllowsAnyFrameRateWithoutMotionBlur) {
+  EXPECT_EQ(ErrorOfScene("grass,fps=120"), "");
+  EXPECT_THAT(ErrorOfScene("grass,fps=120,blur=2"), HasSubstr("exposure"));
+  EXPECT_EQ(ErrorOfScene("grass,fps=120,blur=2,exposure=8"), "");
+}
+
 TEST(Simulation, ReportsInvalidOptions) {
   const auto fault = [](auto change) {
     SimulationOptions options;
@@ -443,7 +449,9 @@ TEST(Simulation, ReportsInvalidOptions) {
   EXPECT_THAT(fault([](auto& options) { options.frame_rate_hz = 0; }), HasSubstr("frame rate"));
   EXPECT_THAT(fault([](auto& options) { options.frame_rate_hz = std::nan(""); }), HasSubstr("frame rate"));
   EXPECT_THAT(fault([](auto& options) { options.duration_s = -1; }), HasSubstr("duration"));
-  EXPECT_THAT(fault([](auto& options) { options.exposure_s = 1; }), HasSubstr("exposure"));
+  EXPECT_THAT(fault([](auto& options) { options.exposure_s = -1; }), HasSubstr("exposure"));
+  EXPECT_THAT(fault([](auto& options) { options.exposure_s = 1, options.blur_samples = 2; }),
+              HasSubstr("exposure"));
   EXPECT_THAT(fault([](auto& options) { options.blur_samples = 0; }), HasSubstr("blur"));
   EXPECT_THAT(fault([](auto& options) { options.noise_sigma = -1; }), HasSubstr("noise"));
   EXPECT_THAT(fault([](auto& options) { options.exposure_drift = 2; }), HasSubstr("drift"));
