@@ -78,6 +78,7 @@ std::optional<double> ErrorAboutAxis(const RotationDrift& drift) {
 void CompareMap(const std::vector<Pair>& pairs, MapResult* map, std::vector<FrameResult>* frames) {
   map->compared_frames = static_cast<int>(pairs.size());
   if (pairs.empty()) return;
+  map->last_compared_frame = pairs.back().frame;
   const engine::Rotation3 truth_from_map_rotation = TruthFromMapRotation(pairs);
   RootMeanSquare rotation_error;
   for (const Pair& pair : pairs) {

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <optional>
 #include <string>
@@ -58,6 +59,8 @@ struct MapResult {
   // Component of that drift about the axis of the true rotation, as in hybrid-slam §7.3; positive when the
   // tracked rotation is too large. Empty when the true rotation is too small to have an axis.
   std::optional<double> axis_drift_deg;
+  // Number of the last frame with a true pose: the drifts above are up to it.
+  std::optional<std::size_t> last_compared_frame = std::nullopt;
   std::optional<Eigen::Vector2d> readout_s = std::nullopt;  // see MapRecord
 };
 

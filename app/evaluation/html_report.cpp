@@ -179,13 +179,15 @@ std::string Section(const EvaluatedRun& run) {
   return html + "</section>\n";
 }
 
-// Rotation error about the true axis up to the last tracked frame. That frame is named when it is not the
-// last frame of the sequence.
+// Rotation error about the true axis up to the last compared frame of the largest map. That frame is named
+// when it is not the last frame of the sequence.
 std::string AxisDrift(const SequenceReport& r) {
   if (!r.axis_drift_deg) return "unknown";
-  const bool to_the_end = r.last_tracked_frame == r.frames - 1;
-  return Fixed(*r.axis_drift_deg, 3) + "°" +
-         (to_the_end ? "" : " at frame " + std::to_string(*r.last_tracked_frame));
+  const std::string drift = Fixed(*r.axis_drift_deg, 3) + "°";
+  if (!r.largest_map) return drift;
+  const std::optional<std::size_t>& last = r.maps[*r.largest_map].last_compared_frame;
+  const bool to_the_end = !last || *last + 1 == static_cast<std::size_t>(r.frames);
+  return to_the_end ? drift : drift + " at frame " + std::to_string(*last);
 }
 
 std::string SummaryRow(const SequenceReport& r, const std::string& name) {

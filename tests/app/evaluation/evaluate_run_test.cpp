@@ -152,6 +152,11 @@ TEST(Evaluation, MeasuresTheErrorOfThePureRotation) {
   EvaluatedRun evaluated{lost, truth, {}, EvaluateRun(lost, truth, {})};
   EXPECT_EQ(evaluated.report.last_tracked_frame, 60);
   EXPECT_THAT(FormatHtmlReport({evaluated}), HasSubstr("° at frame 60<"));
+  // So it does if the camera is tracked in another, smaller map to the end.
+  for (std::size_t i = 71; i <= 90; ++i) lost.frames[i] = PerfectFrame(truth[i], 2);
+  evaluated = {lost, truth, {}, EvaluateRun(lost, truth, {})};
+  EXPECT_EQ(evaluated.report.last_tracked_frame, 90);
+  EXPECT_THAT(FormatHtmlReport({evaluated}), HasSubstr("° at frame 60<"));
   auto back = Helix(30);
   for (TimedPose& pose : back) pose.truth_from_camera.rotation = engine::Rotation3();
   EXPECT_FALSE(EvaluateRun(PerfectRun(back), back, {}).axis_drift_deg);
