@@ -102,6 +102,7 @@ void CompareMap(const std::vector<Pair>& pairs, MapResult* map, std::vector<Fram
     in_truth.push_back(pair.truth_from_camera.translation);
     in_map.push_back(pair.map_from_camera.translation);
   }
+  if (positioned.size() < kMinComparedFrames) return;
   const std::optional<engine::Sim3> truth_from_map = engine::AlignSim3(in_truth, in_map);
   if (!truth_from_map) return;
   RootMeanSquare position_error;
@@ -111,7 +112,6 @@ void CompareMap(const std::vector<Pair>& pairs, MapResult* map, std::vector<Fram
     frame.position_error_m = (*frame.position_in_truth - in_truth[i]).norm();
     position_error.Add(*frame.position_error_m);
   }
-  if (positioned.size() < kMinComparedFrames) return;
   map->ate_rmse_m = position_error.Get();
   map->scale = truth_from_map->scale;
 }

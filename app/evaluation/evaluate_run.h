@@ -33,9 +33,11 @@ struct EvaluationOptions {
 
 // One frame compared with the truth; members are empty when there is nothing to compare.
 struct FrameResult {
-  bool tracked = false;                              // Has a pose in a map that was kept.
-  bool has_position = false;                         // That map also had finite points.
-  std::optional<Eigen::Vector3d> position_in_truth;  // By the map's alignment.
+  bool tracked = false;       // Has a pose in a map that was kept.
+  bool has_position = false;  // That map also had finite points.
+  // By the map's alignment; empty if fewer than kMinComparedFrames of the map have a position and a true
+  // pose.
+  std::optional<Eigen::Vector3d> position_in_truth;
   std::optional<double> position_error_m;
   std::optional<double> rotation_error_deg;  // After aligning rotations.
 };

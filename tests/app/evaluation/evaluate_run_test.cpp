@@ -328,6 +328,24 @@ TEST(Evaluation, HasNoErrorsWhereTheTruthCoversAFewFramesOnlyAndSaysSo) {
   EXPECT_THAT(FormatSummary(with(400)), HasSubstr("only 0 of 400 tracked frames have a true pose"));
 }
 
+TEST(Evaluation, LeavesOutThePositionsOfAMapWithAFewFramesOnly) {
+  const auto truth = Helix(109);
+  RunRecord run = PerfectRun(truth);
+  for (std::size_t i = 0; i < 100; ++i) MoveInTruth(&run.frames[i], {0, i % 2 == 0 ? 0.1 : -0.1, 0});
+  for (std::size_t i = 100; i < 109; ++i) run.frames[i].map_key = 2;
+  const SequenceReport report = EvaluateRun(run, truth, {{TimeOf(0), "walk"}, {TimeOf(100), "short"}});
+  EXPECT_EQ(report.maps.at(1).compared_frames, 9);
+  EXPECT_TRUE(report.frame_results[99].position_error_m);
+  EXPECT_FALSE(report.frame_results[100].position_error_m);
+  EXPECT_FALSE(report.frame_results[100].position_in_truth);
+  EXPECT_TRUE(report.frame_results[100].rotation_error_deg);
+  EXPECT_TRUE(report.segments.at(0).ate_rmse_m);
+  EXPECT_FALSE(report.segments.at(1).ate_rmse_m);
+  ASSERT_TRUE(report.ate_rmse_m);
+  EXPECT_THAT(MakeRunRow({}, run, report, std::nullopt).ate_m,
+              Optional(DoubleNear(*report.ate_rmse_m, 1e-9)));
+}
+
 TEST(Evaluation, IsEmptyForAnEmptyRun) {
   const SequenceReport report = EvaluateRun({}, {}, {});
   EXPECT_EQ(report.tracked_ratio, 0);
