@@ -71,6 +71,7 @@ class DeviceSource : public FrameSource {
   cv::Size size_;                       // Negotiated when the device was first opened.
   std::optional<LockedControls> locked_;
   std::uint64_t since_opened_ = 0;  // Images delivered since the device was opened.
+  bool is_reopened_ = false;        // And has delivered no image since.
   std::string trouble_;
   Delivery delivery_;
   LatencyWindow latency_;
@@ -160,6 +161,8 @@ bool DeviceSource::Deliver(DeviceStream::Loan loan, engine::Frame* frame) {
   frame->image = std::move(image);
   ++delivery_.delivered;
   ++since_opened_;
+  // A camera that can be opened but sends nothing has not come back.
+  if (std::exchange(is_reopened_, false)) ++delivery_.reconnections;
   return true;
 }
 
@@ -189,7 +192,7 @@ void DeviceSource::Reopen() {
         error.what();  // Permissions are set shortly after a device appears, so a later attempt may succeed.
     return;
   }
-  ++delivery_.reconnections;
+  is_reopened_ = true;
   trouble_.clear();
 }
 

@@ -227,6 +227,28 @@ TEST(Device, ContinuesAfterReconnection) {
   EXPECT_EQ(source->delivery().reconnections, 1);
 }
 
+TEST(Device, CountsAReconnectionWhenAnImageComesAgain) {
+  FakeCamera camera;
+  camera.images_until_silent = 1;
+  CameraOptions options;
+  options.reconnect = true;
+  const auto source = Open(&camera, options);
+  engine::Frame frame;
+  ASSERT_TRUE(source->Next(&frame));
+  for (int i = 0; i < 3; ++i) {
+    ASSERT_TRUE(source->Next(&frame));
+    EXPECT_TRUE(frame.image.empty());
+    EXPECT_THAT(source->trouble(), HasSubstr("sent no image"));
+  }
+  EXPECT_EQ(source->delivery().reconnections, 0);
+  camera.images_until_silent = 1000;
+  for (int i = 0; i < 3; ++i) {
+    ASSERT_TRUE(source->Next(&frame));
+    EXPECT_FALSE(frame.image.empty());
+  }
+  EXPECT_EQ(source->delivery().reconnections, 1);
+}
+
 TEST(Device, ClosesItsHeadTooWhenItIsUnplugged) {
   FakeCamera camera;
   camera.controls = {{V4L2_CID_PAN_ABSOLUTE, 0}};
