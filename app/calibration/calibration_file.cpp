@@ -53,7 +53,7 @@ LensModel NeedLens(const YamlReader& file, const std::string& field, const std::
 CameraModel Checked(const YamlReader& file, LensModel lens, const CameraModel::Intrinsics& intrinsics,
                     const Distortion& distortion) {
   if (const auto problem = CameraModel::Validate(lens, intrinsics, distortion)) {
-    throw Error(file.name() + " does not describe a camera: " + *problem + ".");
+    throw Error(file.name() + " does not describe a camera: " + *problem);
   }
   return CameraModel(lens, intrinsics, distortion);
 }

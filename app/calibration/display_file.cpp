@@ -33,7 +33,7 @@ DisplayEye ReadEye(const YamlReader& file, const std::string& side) {
       file.Integer("width"), file.Integer("height"), lens[0], lens[1], lens[2], lens[3]};
   const auto model = engine::LensModel::kRadialTangential;
   if (const auto problem = engine::CameraModel::Validate(model, intrinsics, {}))
-    throw Error(file.name() + " does not describe a display: " + *problem + ".");
+    throw Error(file.name() + " does not describe a display: " + *problem);
   const Eigen::Vector3d position = VectorOf(file, side + "_position");
   if (position.norm() > kMostApart_m)
     throw Error(file.name() + ": the field '" + side +

@@ -156,7 +156,8 @@ TEST(Calibration, IsRejectedWithAnErrorIfInvalid) {
   EXPECT_THAT(error(Without("fx") + "fx: nan\n"), HasSubstr("'fx'"));
   EXPECT_THAT(error(Without("fx") + "fx: wide\n"), HasSubstr("'fx'"));
   EXPECT_THAT(error(Without("fx") + "fx: -500\n"), HasSubstr("file"));
-  EXPECT_THAT(error(Without("width") + "width: 0\n"), HasSubstr("file"));
+  EXPECT_THAT(error(Without("width") + "width: 0\n"),
+              AllOf(HasSubstr("file does not describe a camera"), ::testing::EndsWith("pixels.")));
   EXPECT_THAT(error(Without("width") + "width: 752.5\n"), HasSubstr("'width'"));
   EXPECT_THAT(error(std::string(kOwn) + "model: omnidirectional\n"), HasSubstr("'omnidirectional'"));
   EXPECT_THAT(error("- 1\n- 2\n"), HasSubstr("not a calibration"));

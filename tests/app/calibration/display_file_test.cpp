@@ -10,6 +10,8 @@
 namespace docent::app {
 namespace {
 
+using ::testing::AllOf;
+using ::testing::EndsWith;
 using ::testing::HasSubstr;
 
 constexpr const char* kDisplay = R"(width: 1280
@@ -50,7 +52,8 @@ TEST(DisplayCalibration, FaultsAreNamedInOneSentence) {
               HasSubstr("'left' has 2 numbers instead of 4"));
   EXPECT_THAT(error("left_position: [-0.04, 0.02, -0.01]\n", ""), HasSubstr("left_position"));
   EXPECT_THAT(error("-0.04, 0.02", "-40, 0.02"), HasSubstr("more than a metre"));
-  EXPECT_THAT(error("width: 1280", "width: 0"), HasSubstr("does not describe a display"));
+  EXPECT_THAT(error("width: 1280", "width: 0"),
+              AllOf(HasSubstr("does not describe a display"), EndsWith("pixels.")));
   EXPECT_THAT(error("0, 90, 0", "0, .nan, 0"), HasSubstr("right_rotation"));
 }
 
