@@ -25,6 +25,9 @@ void ReadInto(const std::filesystem::path& path, std::size_t max_bytes, Buffer* 
   buffer->clear();
   std::error_code error;
   const auto status = std::filesystem::status(path, error);
+  // As below a folder without permission: whether there is a file is not known.
+  if (error && status.type() == std::filesystem::file_type::none)
+    throw Error("Cannot read '" + path.string() + "': " + error.message() + ".");
   if (!std::filesystem::exists(status)) throw Error("There is no file '" + path.string() + "'.");
   if (std::filesystem::is_directory(status)) {
     throw Error("'" + path.string() + "' is a folder, not a file.");

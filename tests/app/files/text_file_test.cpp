@@ -1,11 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "app/files/text_file.h"
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <filesystem>
 
 #include "engine/base/random.h"
+#include "tests/app/support/temporary_folder.h"
 
 namespace docent::app {
 namespace {
@@ -32,6 +35,16 @@ TEST(Seconds, AreReadBackEqual) {
     EXPECT_EQ(ParseSeconds(FormatSeconds(Timestamp(count))), Timestamp(count))
         << FormatSeconds(Timestamp(count));
   }
+}
+
+TEST(TextFile, IsNotCalledMissingWhereThatIsUnknown) {
+  const TemporaryFolder folder;
+  EXPECT_EQ(ErrorOf([&] { ReadTextFile(folder / "none.txt"); }),
+            "There is no file '" + (folder / "none.txt").string() + "'.");
+  // A link to itself cannot be followed, whoever reads it; a folder without permission is none for root.
+  std::filesystem::create_symlink("loop.txt", folder / "loop.txt");
+  EXPECT_THAT(ErrorOf([&] { ReadTextFile(folder / "loop.txt"); }),
+              testing::StartsWith("Cannot read '" + (folder / "loop.txt").string() + "': "));
 }
 
 TEST(ContentLines, KeepTheirNumbersWithoutCommentsAndBlanks) {
