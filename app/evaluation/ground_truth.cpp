@@ -16,8 +16,14 @@ std::string At(const std::string& name, int line) {
   return name + ", line " + std::to_string(line);
 }
 
+// Differences of times that are centuries apart do not fit into 64 bits; images have the same limit.
 template <typename Item>
-void CheckOrder(const std::vector<Item>& items, Timestamp time, const std::string& name, int line) {
+void CheckTime(const std::vector<Item>& items, Timestamp time, const std::string& name, int line) {
+  constexpr Timestamp kFarthest = std::chrono::seconds(3'000'000'000);  // 95 years.
+  if (time > kFarthest || time < -kFarthest) {
+    throw Error(At(name, line) + ": the time " + FormatSeconds(time) +
+                " s is more than 95 years away from 0.");
+  }
   if (!items.empty() && time <= items.back().time) {
     throw Error(At(name, line) + ": the time is not later than the previous one.");
   }
@@ -41,7 +47,7 @@ std::vector<TimedPose> ParseGroundTruth(std::string_view text, const std::string
     }
     const Eigen::Quaterniond rotation(v[6], v[3], v[4], v[5]);
     if (std::abs(rotation.norm() - 1) > 0.01) fail("the quaternion does not have the length 1.");
-    CheckOrder(poses, *time, name, line.number);
+    CheckTime(poses, *time, name, line.number);
     poses.push_back({*time, {engine::Rotation3(rotation), Eigen::Vector3d(v[0], v[1], v[2])}});
   }
   if (poses.empty()) throw Error(name + " contains no poses.");
@@ -58,7 +64,7 @@ std::vector<TimedLabel> ParseSegments(std::string_view text, const std::string& 
     const auto fields = SplitFields(line.text);
     const auto time = ParseSeconds(fields[0]);
     if (fields.size() != 2 || !time) throw Error(At(name, line.number) + ": expected 'timestamp label'.");
-    CheckOrder(labels, *time, name, line.number);
+    CheckTime(labels, *time, name, line.number);
     labels.push_back({*time, std::string(fields[1])});
   }
   return labels;

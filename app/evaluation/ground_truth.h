@@ -25,11 +25,11 @@ struct TimedLabel {
 };
 
 // Reads lines `timestamp tx ty tz qx qy qz qw` (camera to world); '#' begins a comment; timestamps must
-// increase. Throws Error with file and line. The Parse functions read from text; `name` is the name in error
-// messages.
+// increase and be at most 95 years away from 0, as those of images. Throws Error with file and line. The
+// Parse functions read from text; `name` is the name in error messages.
 std::vector<TimedPose> ReadGroundTruth(const std::filesystem::path& path);
 std::vector<TimedPose> ParseGroundTruth(std::string_view text, const std::string& name);
-// Reads lines `timestamp label`; '#' begins a comment; timestamps must increase.
+// Reads lines `timestamp label` with the same rules.
 std::vector<TimedLabel> ReadSegments(const std::filesystem::path& path);
 std::vector<TimedLabel> ParseSegments(std::string_view text, const std::string& name);
 

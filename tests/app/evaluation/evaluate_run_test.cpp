@@ -17,6 +17,7 @@ namespace docent::app {
 namespace {
 
 using engine::TrackingState;
+using ::testing::AllOf;
 using ::testing::DoubleNear;
 using ::testing::HasSubstr;
 using ::testing::Not;
@@ -413,6 +414,17 @@ TEST(GroundTruth, NamesTheLineOfAnError) {
   EXPECT_THAT(error("1 1 2 nan 0 0 0 1\n"), HasSubstr("finite"));
   EXPECT_THAT(error("2 1 2 3 0 0 0 1\n1 1 2 3 0 0 0 1\n"), HasSubstr("line 2"));
   EXPECT_THAT(error("# nothing\n"), HasSubstr("no poses"));
+}
+
+TEST(GroundTruth, RefusesTimesThatAreCenturiesAway) {
+  for (const char* text : {"-8000000000", "-3000000001", "3000000001"}) {
+    const std::string time = text;
+    EXPECT_THAT(ErrorOf([&] { ParseGroundTruth(time + " 1 2 3 0 0 0 1\n", "truth"); }),
+                AllOf(HasSubstr("truth, line 1"), HasSubstr("95 years")));
+    EXPECT_THAT(ErrorOf([&] { ParseSegments(time + " walk\n", "segments"); }),
+                AllOf(HasSubstr("segments, line 1"), HasSubstr("95 years")));
+  }
+  EXPECT_EQ(ParseGroundTruth("-3000000000 1 2 3 0 0 0 1\n3000000000 1 2 3 0 0 0 1\n", "truth").size(), 2u);
 }
 
 TEST(GroundTruth, FindsThePoseNearestInTime) {
