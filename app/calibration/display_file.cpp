@@ -28,6 +28,7 @@ Eigen::Vector3d VectorOf(const YamlReader& file, const std::string& field) {
 
 DisplayEye ReadEye(const YamlReader& file, const std::string& side) {
   constexpr double kMostApart_m = 1;  // An eye that is further from the camera is on another head.
+  constexpr double kMostTurned_deg = 360;
   const std::vector<double> lens = NeedNumbers(file, side, 4);
   const engine::CameraModel::Intrinsics intrinsics{
       file.Integer("width"), file.Integer("height"), lens[0], lens[1], lens[2], lens[3]};
@@ -40,6 +41,9 @@ DisplayEye ReadEye(const YamlReader& file, const std::string& side) {
                 "_position' is more than a metre away from the camera.");
   Eigen::Vector3d rotation_deg = Eigen::Vector3d::Zero();
   if (file.Has(side + "_rotation")) rotation_deg = VectorOf(file, side + "_rotation");
+  // The square of a huge angle is infinite, and the rotation not a number.
+  if (rotation_deg.norm() > kMostTurned_deg)
+    throw Error(file.name() + ": the field '" + side + "_rotation' turns the eye by more than 360 degrees.");
   DisplayEye eye;
   eye.camera = engine::CameraModel(model, intrinsics, {});
   eye.eye_from_camera.rotation =

@@ -32,7 +32,8 @@ struct DisplayCalibration {
 //   left_rotation: [x, y, z]     # of the eye against the camera: axis times angle, degrees; may be left out
 //   right_rotation: [x, y, z]
 //
-// Throws Error with one sentence, which names the file and the field.
+// An eye may be turned by up to 360 degrees. Throws Error with one sentence, which names the file and the
+// field.
 DisplayCalibration ReadDisplayCalibration(const std::filesystem::path& file);
 
 }  // namespace docent::app

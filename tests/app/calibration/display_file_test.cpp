@@ -55,6 +55,9 @@ TEST(DisplayCalibration, FaultsAreNamedInOneSentence) {
   EXPECT_THAT(error("width: 1280", "width: 0"),
               AllOf(HasSubstr("does not describe a display"), EndsWith("pixels.")));
   EXPECT_THAT(error("0, 90, 0", "0, .nan, 0"), HasSubstr("right_rotation"));
+  EXPECT_THAT(error("0, 90, 0", "0, 361, 0"),
+              AllOf(HasSubstr("right_rotation"), HasSubstr("more than 360 degrees")));
+  EXPECT_THAT(error("0, 90, 0", "0, 1e200, 0"), HasSubstr("more than 360 degrees"));
 }
 
 }  // namespace
