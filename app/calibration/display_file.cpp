@@ -56,7 +56,11 @@ DisplayEye ReadEye(const YamlReader& file, const std::string& side) {
 
 DisplayCalibration ReadDisplayCalibration(const std::filesystem::path& path) {
   constexpr std::size_t kMaxBytes = 1 << 20;
-  const YamlReader file(ReadTextFile(path, kMaxBytes), path.string());
+  return ParseDisplayCalibration(ReadTextFile(path, kMaxBytes), path.string());
+}
+
+DisplayCalibration ParseDisplayCalibration(const std::string& text, const std::string& name) {
+  const YamlReader file(text, name);
   return {{ReadEye(file, "left"), ReadEye(file, "right")}};
 }
 

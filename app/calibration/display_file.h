@@ -3,6 +3,7 @@
 
 #include <array>
 #include <filesystem>
+#include <string>
 
 #include "engine/geometry/camera_model.h"
 #include "engine/geometry/rigid3.h"
@@ -35,5 +36,7 @@ struct DisplayCalibration {
 // An eye may be turned by up to 360 degrees. Throws Error with one sentence, which names the file and the
 // field.
 DisplayCalibration ReadDisplayCalibration(const std::filesystem::path& file);
+// The same from the text of a file; `name` is its name in error messages.
+DisplayCalibration ParseDisplayCalibration(const std::string& text, const std::string& name);
 
 }  // namespace docent::app
