@@ -132,7 +132,7 @@ TEST(RunDistribution, AlignsEachFrameWithItsOwnMap) {
   RunRecord run;
   std::vector<TimedPose> truth;
   // Two maps of one path, whose scales differ by a factor of ten.
-  for (int i = 0; i < 20; ++i) {
+  for (int i = 0; i < 24; ++i) {
     run.frames.push_back(FrameAt(i, TrackingState::kSixDof, i < 12 ? 1 : 2));
     const Eigen::Vector3d center(i, i * i * 0.1, 1);
     truth.push_back({run.frames.back().time, {engine::Rotation3(), center}});
