@@ -17,12 +17,12 @@ class KeyQueue {
  public:
   // Before each frame of the current context of Dear ImGui.
   void Update(Window* window);
-  // Whether no key waits for its turn.
-  bool empty() const { return waiting_.empty(); }
+  // Whether no key waits for its turn or has it in this frame.
+  bool empty() const { return waiting_.empty() && !given_; }
 
  private:
   std::deque<PressedKey> waiting_;
-  std::optional<PressedKey> given_;  // Down in the last frame, because it was its turn.
+  std::optional<PressedKey> given_;  // Down in this frame, because it is its turn.
 };
 
 }  // namespace docent::ui
