@@ -84,7 +84,7 @@ std::string KeyName(int key, const std::string& written) {
 struct Window::Impl {
   GLFWwindow* window = nullptr;
   std::vector<InputEvent> events;
-  std::vector<PressedKey> pressed;
+  std::vector<TypedInput> typed;
   // The place and size of the window before it became full screen.
   Eigen::Vector2i place = Eigen::Vector2i::Zero(), size = Eigen::Vector2i::Zero();
 
@@ -110,9 +110,14 @@ struct Window::Impl {
     event.shift = (modifiers & GLFW_MOD_SHIFT) != 0;
     if (action == GLFW_PRESS && IsForWidgets(key, event.control)) {
       const int index = IsLetter(event.key) ? GLFW_KEY_A + event.key[0] - 'a' : key;
-      Of(window).pressed.push_back({key, index, event.control, event.shift});
+      Of(window).typed.push_back({0, key, index, event.control, event.shift});
     }
     if (!event.key.empty()) Of(window).events.push_back(std::move(event));
+  }
+  static void OnCharacter(GLFWwindow* window, unsigned character) {
+    TypedInput typed;
+    typed.character = character;
+    Of(window).typed.push_back(typed);
   }
   static void OnDrop(GLFWwindow* window, int count, const char** paths) {
     InputEvent event;
@@ -160,6 +165,7 @@ Window::Window(const std::string& title, int width_px, int height_px) : impl_(st
   glfwSetWindowUserPointer(impl_->window, impl_.get());
   glfwSetMouseButtonCallback(impl_->window, Impl::OnButton);
   glfwSetKeyCallback(impl_->window, Impl::OnKey);
+  glfwSetCharCallback(impl_->window, Impl::OnCharacter);
   glfwSetDropCallback(impl_->window, Impl::OnDrop);
   glfwSetFramebufferSizeCallback(impl_->window, Impl::OnResize);
   glfwSetWindowCloseCallback(impl_->window, Impl::OnClose);
@@ -177,13 +183,13 @@ void Window::MakeCurrent() {
 }
 
 std::vector<InputEvent> Window::PollEvents() {
-  impl_->pressed.clear();
+  impl_->typed.clear();
   glfwPollEvents();
   return std::exchange(impl_->events, {});
 }
 
-std::vector<PressedKey> Window::TakePressedKeys() {
-  return std::exchange(impl_->pressed, {});
+std::vector<TypedInput> Window::TakeTyped() {
+  return std::exchange(impl_->typed, {});
 }
 
 void Window::Show() {

@@ -32,11 +32,12 @@ struct InputEvent {
 // the one that is written, so that Ctrl-Z is where the user reads Z.
 std::string KeyName(int key, const std::string& written);
 
-// A key that was pressed and that may mean something to a widget.
-struct PressedKey {
-  int key = 0;    // GLFW_KEY_...
-  int index = 0;  // Dear ImGui's index of it: the key of a US keyboard that writes the same letter.
-  bool control = false, shift = false;
+// What was typed for a widget: a character, or a key that does more than to write one.
+struct TypedInput {
+  unsigned character = 0;  // Unicode; 0 for a key.
+  int key = 0;             // GLFW_KEY_...
+  int index = 0;  // Dear ImGui's index of the key: that of a US keyboard that writes the same letter.
+  bool control = false, shift = false;  // While the key was pressed.
 };
 
 // A window with an OpenGL 3.3 core context (GLFW). It may only be used on the thread that constructed it,
@@ -53,9 +54,8 @@ class Window : public GraphicsContext {
   void MakeCurrent() override;
   // Returns the events since the last call, in order. Does not wait.
   std::vector<InputEvent> PollEvents();
-  // Returns the keys that were pressed during the last call of PollEvents, in order, and forgets them. Those
-  // that only write a character are not among them.
-  std::vector<PressedKey> TakePressedKeys();
+  // Returns what was typed during the last call of PollEvents, in order, and forgets it.
+  std::vector<TypedInput> TakeTyped();
   // Shows the contents of the default framebuffer; waits for the screen when vertical sync is on.
   void Show();
   // Of the monitor that the window was opened on, as it reports it; 96 dots per inch where it reports nothing

@@ -195,6 +195,13 @@ TEST_F(InterfaceOnScreen, ControlKeysBetweenTwoFramesChangeTheText) {
   EXPECT_THAT(asked_.words, ElementsAre("rename map Hall to HallHall"));
 }
 
+TEST_F(InterfaceOnScreen, TextBetweenTwoFramesIsWrittenInItsOrderWithKeys) {
+  BeginRenameOfHall();
+  person_.PressBetweenFrames("End a BackSpace b ctrl+a C o v e space 2 BackSpace 3 Return");
+  for (int i = 0; i < 24; ++i) Draw();
+  EXPECT_THAT(asked_.words, ElementsAre("rename map Hall to Cove 3"));
+}
+
 TEST_F(InterfaceOnScreen, UndoAndRedoAreTheLettersOfTheLayout) {
   gui_.reset();
   window_.reset();
