@@ -451,8 +451,7 @@ void AuthorControls::TogglePanel() {
 void AuthorControls::AskToQuit() {
   is_quitting_ = true;
   has_emitted_ = false;
-  if (gui_.WritesText()) return gui_.LeaveField();
-  GoOnAfterWriting();
+  gui_.LeaveField();  // Also without a field: keys that were pressed before do not answer the question.
 }
 
 void AuthorControls::GoOnAfterWriting() {

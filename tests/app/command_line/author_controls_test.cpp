@@ -293,6 +293,26 @@ TEST_F(AuthorAtControls, NothingIsPlacedOnceTheAuthorHasAskedToQuit) {
   EXPECT_EQ(controls_->ending(), AuthorControls::Ending::kNone);
 }
 
+TEST_F(AuthorAtControls, EnterBeforeTheWishToQuitDoesNotAnswerItsQuestion) {
+  saving_.unsaved = true;
+  Draw(3);
+  person_.PressBetweenFrames("Down Return ctrl+q");
+  Draw(12);
+  EXPECT_EQ(controls_->ending(), AuthorControls::Ending::kNone);
+  PressReturn();
+  EXPECT_EQ(controls_->ending(), AuthorControls::Ending::kSave) << "the question is open";
+}
+
+TEST_F(AuthorAtControls, EscapeBeforeTheWishToQuitDoesNotCloseItsQuestion) {
+  saving_.unsaved = true;
+  Draw(3);
+  person_.PressBetweenFrames("Escape ctrl+q");
+  Draw(12);
+  EXPECT_EQ(controls_->ending(), AuthorControls::Ending::kNone);
+  PressReturn();
+  EXPECT_EQ(controls_->ending(), AuthorControls::Ending::kSave) << "the question is open";
+}
+
 TEST_F(AuthorAtControls, NothingIsPlacedOnceTheAuthorHasQuit) {
   SetLens();
   ASSERT_EQ(std::system("xdotool mousemove 300 400"), 0);
@@ -303,6 +323,7 @@ TEST_F(AuthorAtControls, NothingIsPlacedOnceTheAuthorHasQuit) {
   enter.key = "enter";
   controls_->choices().pick = ui::MapPick::kFloor;
   controls_->Handle(quit);
+  Draw(3);
   EXPECT_EQ(controls_->ending(), AuthorControls::Ending::kSave) << "nothing was unsaved";
   controls_->Handle(enter);
   EXPECT_THAT(commands_, IsEmpty());
