@@ -79,10 +79,12 @@ std::string VisitorHint(const RejectionMessage& rejection, engine::Hint hint, co
 }
 
 void VisitorGuide::FollowRoute(bool has_pose, ShownFrame* frame) {
+  // Not the frame's `seconds`, which count from the first image of its own camera.
+  const double seconds = ToSeconds(frame->tracked.frame.time);
   if (has_pose) {
-    route_->Enter(frame->tracked.map_key, frame->seconds, frame->tracked.frame.camera);
+    route_->Enter(frame->tracked.map_key, seconds, frame->tracked.frame.camera);
   } else if (!IsSkipped(*frame)) {
-    route_->Leave(frame->seconds, frame->tracked.frame.camera);
+    route_->Leave(seconds, frame->tracked.frame.camera);
   }
   ui::VisitorDisplay& display = *frame->visitor;
   display.route_line = RouteLine(*route_, strings_);

@@ -41,6 +41,7 @@ class KioskOnAStand : public ::testing::Test {
     for (int i = 0; i < duration_s; ++i, ++now_s_) {
       frame_ = std::make_shared<ShownFrame>();
       frame_->seconds = now_s_;
+      frame_->tracked.frame.time = FromSeconds(now_s_);
       frame_->tracked.frame.image = cv::Mat(48, 64, CV_8UC1, cv::Scalar(120));
       frame_->tracked.state = engine::TrackingState::kSixDof;
       frame_->tracked.map_key = 1;

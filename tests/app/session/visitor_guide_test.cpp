@@ -77,6 +77,7 @@ TEST(VisitorGuide, TheOtherCameraThatIsLostTakesNoVisitorAway) {
   tracked->shown.map_name = "Desk";
   lost->tracked.state = engine::TrackingState::kLost;
   lost->tracked.frame.camera = 1;
+  lost->seconds = 3;  // Its first image was three seconds earlier.
   first.Guide(tracked, simulation->camera());
   second.Guide(lost, simulation->camera());
   EXPECT_EQ(state.Here(), 0u);
