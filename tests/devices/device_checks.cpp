@@ -301,7 +301,8 @@ class JpegFeeder {
         if (write(file_, bytes.data(), bytes.size()) < 0) return;
         std::this_thread::sleep_for(std::chrono::milliseconds(40));
         const auto end = std::chrono::steady_clock::now() + longest_wait;
-        while ((number - received_ + kNumbers) % kNumbers > 2 && std::chrono::steady_clock::now() < end) {
+        while (!stop.stop_requested() && (number - received_ + kNumbers) % kNumbers > 2 &&
+               std::chrono::steady_clock::now() < end) {
           std::this_thread::sleep_for(std::chrono::milliseconds(5));
         }
       }
