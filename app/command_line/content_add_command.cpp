@@ -285,7 +285,8 @@ void CheckKindOfFile(const CLI::App& add, const AddOptions& options) {
     if (is_sound && add.count(name) > 0) throw CLI::ValidationError(name, "is not for a sound");
   }
   for (const char* name : {"--caption", "--range"}) {
-    if (!is_sound && add.count(name) > 0) throw CLI::ValidationError(name, "is only for a sound");
+    if (!is_sound && add.count(name) > 0)
+      throw CLI::ValidationError(name, "is only for a sound (.wav, .flac, .ogg or .oga)");
   }
   if (is_sound && options.caption.empty()) throw CLI::ValidationError("--caption", "a sound needs a caption");
 }
