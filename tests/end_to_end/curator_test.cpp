@@ -333,6 +333,8 @@ std::map<std::pair<std::string, std::string>, Eigen::Vector2d> LoggedPixels(
 
 // More than half a mark in the images of the tour.
 constexpr int kMarkReach_px = 60;
+// The first row of the images of the tour that the sentence for visitors may cover.
+constexpr int kSentence_px = 400;
 
 // The middle of what has this colour around a pixel.
 std::optional<Eigen::Vector2d> FindMark(const cv::Mat& image, const Eigen::Vector2d& near,
@@ -376,6 +378,7 @@ std::map<std::string, Errors> CuratorAtWindow::Measure(const std::filesystem::pa
           found != logged.end() && !content::HasModel(entity))
         errors[placed.entity + " (logged)"].Add((found->second - *truth).norm());
       if (placed.entity != "vase" || image.empty() || !lens.IsInside(*truth, kMarkReach_px)) continue;
+      if (truth->y() + kMarkReach_px > kSentence_px) continue;
       if (const auto drawn = FindMark(image, *truth, MarkColors()[number]))
         errors[placed.entity + " (drawn)"].Add((*drawn - *truth).norm());
     }
