@@ -105,6 +105,16 @@ class AuthorAtControls : public ::testing::Test {
     person_.Type("Cove");
   }
   void PressReturn() { person_.Press("Return"); }
+  // With unsaved changes, all keys come between two frames, and the question stays until it is answered.
+  void ExpectQuestionAfter(const std::string& keys) {
+    saving_.unsaved = true;
+    Draw(3);
+    person_.PressBetweenFrames(keys);
+    Draw(12);
+    EXPECT_EQ(controls_->ending(), AuthorControls::Ending::kNone);
+    PressReturn();
+    EXPECT_EQ(controls_->ending(), AuthorControls::Ending::kSave);
+  }
   void LoseTheCamera() {
     is_in_map_ = false;
     Draw(3);
@@ -294,23 +304,11 @@ TEST_F(AuthorAtControls, NothingIsPlacedOnceTheAuthorHasAskedToQuit) {
 }
 
 TEST_F(AuthorAtControls, EnterBeforeTheWishToQuitDoesNotAnswerItsQuestion) {
-  saving_.unsaved = true;
-  Draw(3);
-  person_.PressBetweenFrames("Down Return ctrl+q");
-  Draw(12);
-  EXPECT_EQ(controls_->ending(), AuthorControls::Ending::kNone);
-  PressReturn();
-  EXPECT_EQ(controls_->ending(), AuthorControls::Ending::kSave) << "the question is open";
+  ExpectQuestionAfter("Down Return ctrl+q");
 }
 
 TEST_F(AuthorAtControls, EscapeBeforeTheWishToQuitDoesNotCloseItsQuestion) {
-  saving_.unsaved = true;
-  Draw(3);
-  person_.PressBetweenFrames("Escape ctrl+q");
-  Draw(12);
-  EXPECT_EQ(controls_->ending(), AuthorControls::Ending::kNone);
-  PressReturn();
-  EXPECT_EQ(controls_->ending(), AuthorControls::Ending::kSave) << "the question is open";
+  ExpectQuestionAfter("Escape ctrl+q");
 }
 
 TEST_F(AuthorAtControls, NothingIsPlacedOnceTheAuthorHasQuit) {
