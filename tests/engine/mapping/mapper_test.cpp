@@ -239,6 +239,24 @@ TEST_F(MapperTest, LearnsTheReadoutTimeFromCornersAfterItsStart) {
   EXPECT_EQ(Validate(*mapper.Snapshot()), "");
 }
 
+TEST_F(MapperTest, AdjustsTheMapToANewReadoutTimeAlthoughAnotherRequestWaits) {
+  const TrackedCorners corners = CornersOfARollingShutter();
+  const auto after_one_step = [&](int requests) {
+    Mapper mapper({});
+    mapper.Start(TurningPair(*pair_, 0));
+    WorkUntilIdle(&mapper);
+    for (int i = 0; i < requests; ++i) mapper.Offer(corners);
+    mapper.Step();
+    return mapper.Snapshot();
+  };
+  const auto before = after_one_step(0), alone = after_one_step(1), with_another = after_one_step(2);
+  const auto position = [](const MapSnapshot& map) -> Eigen::Vector3d {
+    return map.keyframes.back().camera_from_map.OriginInSource();
+  };
+  ASSERT_GT((position(*alone) - position(*before)).norm(), 1e-4) << "the readout time moves the camera";
+  EXPECT_EQ(position(*with_another), position(*alone));
+}
+
 TEST_F(MapperTest, CorrectsAReadoutTimeThatWasNotEstimatedFromCorners) {
   Mapper mapper({});
   mapper.Start(TurningPair(*pair_, 0.035));
