@@ -2,7 +2,6 @@
 #include <gmock/gmock.h>
 
 #include <algorithm>
-#include <utility>
 
 #include "app/session/library_scene.h"
 #include "maps/hub/administration.h"
@@ -11,33 +10,15 @@
 #include "maps/hub/sync_state.h"
 #include "tests/hub/hub_samples.h"
 #include "tests/hub/private_server.h"
+#include "tests/hub/two_devices.h"
 
 // Two devices, whose libraries are `a` and `b`, share a hub.
 namespace docent::maps {
 namespace {
 
 using testing::HasSubstr;
-using testing::Not;
 
-class HubSync : public WithHubServer {
- protected:
-  SyncReport PushFrom(const std::string& name) { return Push(SampleSync(Url(), folder_ / name)); }
-  SyncReport PullTo(const std::string& name) { return Pull(SampleSync(Url(), folder_ / name)); }
-  Library Open(const std::string& name) { return OpenSampleLibrary(folder_ / name); }
-
-  // A map that both devices have.
-  std::uint64_t ShareMap(const std::string& name, Policy policy = Policy::kOpen) {
-    {
-      Library a = Open("a");
-      AddSampleMap(&a, name, 7, policy);
-    }
-    PushFrom("a");
-    PullTo("b");
-    return Open("b").FindByName(name).key;
-  }
-
-  TemporaryFolder folder_;
-};
+class HubSync : public WithTwoDevices {};
 
 TEST_F(HubSync, AMapArrivesAsItIs) {
   {
@@ -288,116 +269,6 @@ TEST_F(HubSync, AnEqualMapTakesTheHubsPolicyWhenTheRecordOfTheExchangeIsLost) {
   }
 }
 
-TEST_F(HubSync, AMapIsRemovedOnBothSidesOnlyIfThatIsAskedFor) {
-  ShareMap("Desk");
-  {
-    Library a = Open("a");
-    a.Remove(a.FindByName("Desk").key);
-  }
-  EXPECT_THAT(LinesOf(PushFrom("a")), HasSubstr("with --removed"));
-  SyncOptions options = SampleSync(Url(), folder_ / "a");
-  options.remove = true;
-  EXPECT_THAT(LinesOf(Push(options)), HasSubstr("was removed from the hub"));
-  EXPECT_THAT(LinesOf(PullTo("b")), HasSubstr("and so here"));
-  EXPECT_EQ(NamesIn(Open("b")), "");
-}
-
-TEST_F(HubSync, AMapThatIsRemovedDuringAPushIsRemovedByTheNext) {
-  ShareMap("Desk");
-  {
-    Library a = Open("a");
-    AddSampleMap(&a, "Shelf", 9);
-  }
-  SyncOptions options = SampleSync(Url(), folder_ / "a");
-  options.remove = true;
-  bool is_removed = false;
-  options.is_stopped = [&] {
-    // The other map is being sent.
-    if (!std::exchange(is_removed, true)) {
-      Library a = Open("a");
-      a.Remove(a.FindByName("Desk").key);
-    }
-    return false;
-  };
-  EXPECT_EQ(Push(options).problems, 0);
-  ASSERT_TRUE(is_removed);
-  const std::vector<HubHead> heads = Hub(Url()).Heads();
-  EXPECT_TRUE(std::none_of(heads.begin(), heads.end(), [](const HubHead& head) { return head.removed; }));
-  EXPECT_THAT(LinesOf(Push(options)), HasSubstr("'Desk' was removed from the hub"));
-}
-
-TEST_F(HubSync, AMapGetsTheNameOfOneThatIsRemovedByTheSamePush) {
-  ShareMap("Desk");
-  {
-    Library a = Open("a");
-    AddSampleMap(&a, "Shelf", 9);
-  }
-  PushFrom("a");
-  PullTo("b");
-  {
-    Library a = Open("a");
-    a.Remove(a.FindByName("Desk").key);
-    AddSampleMap(&a, "Desk", 8);  // Built anew.
-  }
-  SyncOptions options = SampleSync(Url(), folder_ / "a");
-  options.remove = true;
-  SyncReport report = Push(options);
-  EXPECT_EQ(report.problems, 0) << LinesOf(report);
-  PullTo("b");
-  EXPECT_EQ(NamesIn(Open("a")), "Desk,Shelf");
-  EXPECT_EQ(NamesIn(Open("b")), "Desk,Shelf");
-  EXPECT_EQ(DifferenceOf("Desk", folder_ / "a", folder_ / "b"), "");
-  {
-    Library a = Open("a");
-    a.Remove(a.FindByName("Desk").key);
-    ExtendMap(&a, a.FindByName("Shelf").key, {0.1, 0, 0}, 51);
-    a.Rename(a.FindByName("Shelf").key, "Desk");
-  }
-  report = Push(options);
-  EXPECT_EQ(report.problems, 0) << LinesOf(report);
-  EXPECT_THAT(Push(options).lines, testing::IsEmpty());
-  PullTo("b");
-  EXPECT_EQ(NamesIn(Open("a")), "Desk");
-  EXPECT_EQ(DifferenceOf("Desk", folder_ / "a", folder_ / "b"), "");
-}
-
-TEST_F(HubSync, AMapThatWasJoinedStaysOnTheHubUntilTheJoinedMapIsSaved) {
-  {
-    Library a = Open("a");
-    const std::uint64_t desk = AddSampleMap(&a, "Desk", 1, Policy::kBounded);
-    const std::uint64_t shelf = AddSampleMap(&a, "Shelf", 2);
-    a.ChangeTours([&](std::vector<Tour>* tours) { tours->push_back({"All", {desk, shelf}, "", 20}); });
-  }
-  PushFrom("a");
-  {
-    Library a = Open("a");
-    const StoredMap desk = a.Load(a.FindByName("Desk").key);
-    const auto joined = std::make_shared<engine::MapSnapshot>(*desk.snapshot);
-    AddSampleKeyFrame(51, {9, 0, 0}, joined.get());
-    ++joined->revision;
-    ASSERT_TRUE(desk.info.bounds);
-    Bounds bounds = *desk.info.bounds;
-    bounds.max.x() += 10;
-    ASSERT_TRUE(a.Join(
-        {desk.info, a.FindByName("Shelf"), joined, std::make_shared<const SceneRecord>(desk.scene), bounds}));
-  }
-  SyncOptions options = SampleSync(Url(), folder_ / "a");
-  options.remove = true;
-  const SyncReport refused = Push(options);
-  EXPECT_GT(refused.problems, 0);
-  EXPECT_THAT(LinesOf(refused), HasSubstr("'Shelf' was removed here and stays on the hub"));
-  for (const HubHead& head : Hub(Url()).Heads()) EXPECT_FALSE(head.removed) << head.name;
-  EXPECT_EQ(Hub(Url()).Tours().at(0).stops.size(), 2u);
-  {
-    Library a = Open("a");
-    a.SetPolicy(a.FindByName("Desk").key, Policy::kOpen);
-  }
-  EXPECT_EQ(Push(options).problems, 0) << "an administrator may do that";
-  PullTo("b");
-  EXPECT_EQ(NamesIn(Open("b")), "Desk");
-  EXPECT_EQ(Open("b").Tours().at(0).stops.size(), 1u);
-}
-
 TEST_F(HubSync, ARevertedMapIsBroughtBackEverywhere) {
   const std::uint64_t on_b = ShareMap("Desk");
   {
@@ -410,94 +281,6 @@ TEST_F(HubSync, ARevertedMapIsBroughtBackEverywhere) {
   EXPECT_EQ(RevertHubMap(Url(), "Desk", 1), 3);
   PullTo("b");
   EXPECT_EQ(TextsIn(Open("b"), on_b), "sign-1=Hello");
-}
-
-TEST_F(HubSync, ToursStopAtTheSameMaps) {
-  {
-    Library a = Open("a");
-    a.ReserveKeys(3);
-    const std::uint64_t desk = AddSampleMap(&a, "Desk", 1), hall = AddSampleMap(&a, "Hall", 2);
-    a.ChangeTours([&](std::vector<Tour>* tours) { tours->push_back({"Short", {hall, desk}, "de", 20}); });
-  }
-  PushFrom("a");
-  PullTo("b");
-  {
-    Library b = Open("b");
-    ASSERT_EQ(b.Tours().size(), 1u);
-    const Tour tour = b.Tours()[0];
-    EXPECT_EQ(tour.stops, (std::vector{b.FindByName("Hall").key, b.FindByName("Desk").key}));
-    EXPECT_EQ(tour.minutes, 20);
-    b.ChangeTours([](std::vector<Tour>* tours) { tours->front().minutes = 30; });
-  }
-  PushFrom("b");
-  PullTo("a");
-  EXPECT_EQ(Open("a").Tours()[0].minutes, 30);
-  EXPECT_THAT(PushFrom("a").lines, testing::IsEmpty());
-}
-
-TEST_F(HubSync, ATourStaysOneTourWhenAMapOfItIsRemovedOnTheHub) {
-  {
-    Library a = Open("a");
-    a.ReserveKeys(3);
-    const std::uint64_t desk = AddSampleMap(&a, "Desk", 1), hall = AddSampleMap(&a, "Hall", 2);
-    AddSampleMap(&a, "Shelf", 3);
-    a.ChangeTours([&](std::vector<Tour>* tours) { tours->push_back({"Short", {hall, desk}, "de", 20}); });
-  }
-  PushFrom("a");
-  for (const char* device : {"b", "c"}) PullTo(device);
-  {
-    Library a = Open("a");
-    const std::uint64_t shelf = a.FindByName("Shelf").key, desk = a.FindByName("Desk").key;
-    a.ChangeTours([&](std::vector<Tour>* tours) { tours->front().stops = {shelf, desk}; });
-    a.Remove(a.FindByName("Hall").key);
-  }
-  SyncOptions options = SampleSync(Url(), folder_ / "a");
-  options.remove = true;
-  EXPECT_EQ(Push(options).problems, 0);
-  {
-    Library c = Open("c");
-    c.Remove(c.FindByName("Hall").key);
-  }
-  EXPECT_THAT(LinesOf(PushFrom("c")), Not(HasSubstr("was changed both here and on the hub")));
-  for (const char* device : {"b", "c"}) {
-    EXPECT_EQ(PullTo(device).problems, 0);
-    const Library library = Open(device);
-    ASSERT_EQ(library.Tours().size(), 1u) << device;
-    EXPECT_EQ(library.Tours()[0].stops,
-              (std::vector{library.FindByName("Shelf").key, library.FindByName("Desk").key}));
-    EXPECT_THAT(PushFrom(device).lines, testing::IsEmpty()) << device;
-  }
-}
-
-TEST_F(HubSync, ATourWhoseLanguageIsInCapitalsOnTheHubIsPulled) {
-  {
-    Library a = Open("a");
-    const std::uint64_t desk = AddSampleMap(&a, "Desk", 1);
-    a.ChangeTours([&](std::vector<Tour>* tours) { tours->push_back({"Short", {desk}, "", 20}); });
-  }
-  PushFrom("a");
-  RunHubSql(Url(), "UPDATE docent.tours SET language = 'DE'");  // As another client may have saved it.
-  EXPECT_EQ(PullTo("b").problems, 0);
-  const std::vector<Tour> tours = Open("b").Tours();
-  ASSERT_EQ(tours.size(), 1u);
-  EXPECT_EQ(tours[0].language, "de");
-  EXPECT_THAT(PushFrom("b").lines, testing::IsEmpty());
-}
-
-TEST_F(HubSync, ATourThatIsDamagedHereStaysOnTheHub) {
-  {
-    Library a = Open("a");
-    const std::uint64_t desk = AddSampleMap(&a, "Desk", 1);
-    a.ChangeTours([&](std::vector<Tour>* tours) { tours->push_back({"Short", {desk}, "", 20}); });
-  }
-  PushFrom("a");
-  RunSql(folder_ / "a", "UPDATE tours SET checksum = checksum + 1");
-  SyncOptions options = SampleSync(Url(), folder_ / "a");
-  options.remove = true;
-  EXPECT_GT(Push(options).problems, 0);
-  const std::vector<HubTour> tours = Hub(Url()).Tours();
-  ASSERT_EQ(tours.size(), 1u);
-  EXPECT_FALSE(tours[0].removed);
 }
 
 TEST_F(HubSync, AnInterruptedPullGoesOnWhereItWas) {
