@@ -12,6 +12,7 @@
 #include "tests/app/support/simulated_session.h"
 #include "tests/hub/hub_samples.h"
 #include "tests/hub/private_server.h"
+#include "tests/support/wait_until.h"
 
 // Libraries that follow a hub.
 namespace docent::maps {
@@ -50,16 +51,6 @@ struct Told {
     return testing::PrintToString(sentences);
   }
 };
-
-// Waits until the condition holds, at most this long.
-bool WaitUntil(const std::function<bool()>& condition, std::chrono::milliseconds longest) {
-  const auto end = Clock::now() + longest;
-  while (Clock::now() < end) {
-    if (condition()) return true;
-    std::this_thread::sleep_for(5ms);
-  }
-  return condition();
-}
 
 // A walk around a table.
 std::shared_ptr<const app::Simulation> Table(double seconds) {

@@ -10,16 +10,15 @@
 #include <cstring>
 #include <filesystem>
 #include <fstream>
-#include <functional>
 #include <memory>
 #include <string>
-#include <thread>
 
 #include "app/sound/sound_device.h"
 #include "content/asset.h"
 #include "engine/base/error.h"
 #include "tests/app/support/temporary_folder.h"
 #include "tests/content/media_samples.h"
+#include "tests/support/wait_until.h"
 
 namespace docent::app {
 namespace {
@@ -55,11 +54,11 @@ class SoundPlayerOfAFile : public ::testing::Test {
   }
   std::string WaitForProblem() {
     std::string problem;
-    Wait([&] { return !(problem = player_.TakeProblem()).empty(); });
+    WaitUntil([&] { return !(problem = player_.TakeProblem()).empty(); });
     return problem;
   }
   bool IsHeard() {
-    return Wait([this] {
+    return WaitUntil([this] {
       std::error_code error;
       const auto size = std::filesystem::file_size(folder_ / "device" / "heard.wav", error);
       return !error && size > 20'000;
@@ -68,7 +67,7 @@ class SoundPlayerOfAFile : public ::testing::Test {
 
   // Silence is written too.
   bool IsToneHeard() {
-    return Wait([this] {
+    return WaitUntil([this] {
       const std::string bytes = ReadAll(folder_ / "device" / "heard.wav");
       const std::size_t header = bytes.find("data");
       if (header == std::string::npos) return false;
@@ -83,16 +82,6 @@ class SoundPlayerOfAFile : public ::testing::Test {
 
   const TemporaryFolder folder_;
   SoundPlayer player_{std::chrono::milliseconds(0)};
-
- private:
-  static bool Wait(const std::function<bool()>& is_true) {
-    const auto end = std::chrono::steady_clock::now() + std::chrono::seconds(120);
-    while (!is_true()) {
-      if (std::chrono::steady_clock::now() >= end) return false;
-      std::this_thread::sleep_for(std::chrono::milliseconds(20));
-    }
-    return true;
-  }
 };
 
 TEST_F(SoundPlayerOfAFile, PlaysALaterSoundWithADeviceThatWasMissing) {

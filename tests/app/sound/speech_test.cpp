@@ -8,25 +8,15 @@
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
-#include <functional>
 #include <string>
-#include <thread>
 
 #include "tests/app/support/temporary_folder.h"
+#include "tests/support/wait_until.h"
 
 namespace docent::app {
 namespace {
 
 using ::testing::HasSubstr;
-
-bool WaitForSpeech(const std::function<bool()>& is_true) {
-  const auto end = std::chrono::steady_clock::now() + std::chrono::seconds(120);
-  while (!is_true()) {
-    if (std::chrono::steady_clock::now() >= end) return false;
-    std::this_thread::sleep_for(std::chrono::milliseconds(20));
-  }
-  return true;
-}
 
 TEST(Speech, SpeaksAgainOnceTheServiceIsBack) {
   const TemporaryFolder folder;
@@ -39,11 +29,11 @@ TEST(Speech, SpeaksAgainOnceTheServiceIsBack) {
   Speech speech("en", std::chrono::milliseconds(0));
   speech.Say("one");
   std::string problem;
-  EXPECT_TRUE(WaitForSpeech([&] { return !(problem = speech.TakeProblem()).empty(); }));
+  EXPECT_TRUE(WaitUntil([&] { return !(problem = speech.TakeProblem()).empty(); }));
   EXPECT_THAT(problem, HasSubstr("there is no speech service"));
   std::ofstream(folder / "service") << "";
   speech.Say("two");
-  EXPECT_TRUE(WaitForSpeech([&] { return std::filesystem::exists(folder / "spoken"); }));
+  EXPECT_TRUE(WaitUntil([&] { return std::filesystem::exists(folder / "spoken"); }));
   setenv("PATH", path.c_str(), 1);
 }
 
