@@ -134,6 +134,21 @@ std::string Dump(const FactsJson& json) {
   }
 }
 
+std::int64_t SaveMapIn(HubTransaction* work, const std::string& map, std::int64_t base, const MapFacts& facts,
+                       const Manifest& manifest) {
+  FactsJson items = FactsJson::object();
+  for (const auto& [item, hash] : manifest) items[item] = hash;
+  return work
+      ->Query("SELECT docent.save_map($1::uuid, $2::bigint, $3::jsonb, $4::jsonb)",
+              {map, std::to_string(base), Dump(ToJson(facts)), Dump(items)})
+      .Integer(0, 0);
+}
+
+std::int64_t RemoveMapIn(HubTransaction* work, const std::string& map, std::int64_t base) {
+  return work->Query("SELECT docent.remove_map($1::uuid, $2::bigint)", {map, std::to_string(base)})
+      .Integer(0, 0);
+}
+
 }  // namespace
 
 Hub::Hub(const std::string& url) : connection_(url) {
@@ -253,22 +268,34 @@ void Hub::PutBlob(std::span<const std::uint8_t> bytes) {
 
 std::int64_t Hub::SaveMap(const std::string& map, std::int64_t base, const MapFacts& facts,
                           const Manifest& manifest) {
-  FactsJson items = FactsJson::object();
-  for (const auto& [item, hash] : manifest) items[item] = hash;
   std::int64_t revision = 0;
   connection_.Transact(HubAccess::kWrite, [&](HubTransaction& work) {
-    const HubRows rows = work.Query("SELECT docent.save_map($1::uuid, $2::bigint, $3::jsonb, $4::jsonb)",
-                                    {map, std::to_string(base), Dump(ToJson(facts)), Dump(items)});
-    revision = rows.Integer(0, 0);
+    revision = SaveMapIn(&work, map, base, facts, manifest);
   });
   return revision;
 }
 
 std::int64_t Hub::RemoveMap(const std::string& map, std::int64_t base) {
   std::int64_t revision = 0;
+  connection_.Transact(HubAccess::kWrite,
+                       [&](HubTransaction& work) { revision = RemoveMapIn(&work, map, base); });
+  return revision;
+}
+
+std::int64_t Hub::ReplaceMap(const HubHead& old, const std::string& map, std::int64_t base,
+                             const MapFacts& facts, const Manifest& manifest) {
+  std::int64_t revision = 0;
   connection_.Transact(HubAccess::kWrite, [&](HubTransaction& work) {
-    revision = work.Query("SELECT docent.remove_map($1::uuid, $2::bigint)", {map, std::to_string(base)})
-                   .Integer(0, 0);
+    try {
+      RemoveMapIn(&work, old.id, old.revision);
+    } catch (const HubUnreachable&) {
+      throw;
+    } catch (const HubConflict&) {
+      throw;
+    } catch (const Error& error) {
+      throw HubRemovalRefused(error.what());
+    }
+    revision = SaveMapIn(&work, map, base, facts, manifest);
   });
   return revision;
 }

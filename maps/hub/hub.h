@@ -36,6 +36,12 @@ struct HubRestoration {
   std::map<std::string, std::int64_t> maps, tours;  // The newest revisions of the backup, by id and by name.
 };
 
+// The hub keeps a map that was to be removed, for instance because of its policy.
+class HubRemovalRefused : public Error {
+ public:
+  using Error::Error;
+};
+
 // Opens a hub, and asks it for maps and saves them.
 class Hub {
  public:
@@ -68,6 +74,10 @@ class Hub {
                        const Manifest& manifest);
   // Removes a map after the revision `base`. Throws HubConflict as SaveMap does.
   std::int64_t RemoveMap(const std::string& map, std::int64_t base);
+  // Removes the map `old` and saves another one, which may have its name, in one change: both or neither.
+  // Otherwise as SaveMap. Throws HubRemovalRefused if the hub keeps `old`.
+  std::int64_t ReplaceMap(const HubHead& old, const std::string& map, std::int64_t base,
+                          const MapFacts& facts, const Manifest& manifest);
   // Puts a map back to an earlier revision, as a new one, which is returned.
   std::int64_t RevertMap(const std::string& map, std::int64_t base, std::int64_t to);
 

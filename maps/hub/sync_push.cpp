@@ -25,32 +25,37 @@ bool IsToBeRemoved(const SyncSession& session, const HubHead& head) {
          link->revision == head.revision && session.local().StampOf(link->key).empty();
 }
 
-// Returns false, and says why, if the hub refuses that.
-bool RemoveFromHub(SyncSession* session, const HubHead& head) {
-  try {
-    session->hub().RemoveMap(head.id, head.revision);
-  } catch (const HubUnreachable&) {
-    throw;
-  } catch (const HubConflict&) {
-    throw;
-  } catch (const Error& error) {
-    session->SayProblem(QuotedName(head.name) + " was not removed from the hub: " + error.what());
-    return false;
-  }
+// Says that a map was removed from the hub, and forgets what both sides agreed on about it.
+void ForgetRemoved(SyncSession* session, const HubHead& head) {
   session->RemoveLink(session->LinkTo(head.id)->key);
   session->Say(QuotedName(head.name) + " was removed from the hub");
-  return true;
 }
 
-// Removes a map from the hub whose name another one is to get. That one comes last, when everything that may
-// contain what was removed is on the hub. Returns false if the name stays taken.
-bool FreeNameOnHub(SyncSession* session, const HubHead& taken) {
+void SayNotRemoved(SyncSession* session, const HubHead& head, const Error& error) {
+  session->SayProblem(QuotedName(head.name) + " was not removed from the hub: " + error.what());
+}
+
+// Sends a map, as SendAndLink does, which gets the name of one that was removed here. The hub removes that in
+// the same change, so that it stays if the hub refuses the new one. This comes last, when everything that may
+// contain what was removed is on the hub. Returns false, and says why, if the hub keeps the other map.
+bool SendInPlaceOf(SyncSession* session, const HubHead& taken, const LocalMap& map, const std::string& id,
+                   std::int64_t base, const std::string& local_name) {
   if (session->report().problems > 0)
     throw Error(
         "the hub has a map of this name, which was removed here and stays there until every other "
         "change is saved");
-  const HubHead head = taken;
-  if (!RemoveFromHub(session, head)) return false;
+  const HubHead old = taken;  // `taken` is one of the heads, which are read again below.
+  session->SendItems(map);
+  session->CheckStopped();
+  std::int64_t revision = 0;
+  try {
+    revision = session->hub().ReplaceMap(old, id, base, map.facts, map.manifest);
+  } catch (const HubRemovalRefused& error) {
+    SayNotRemoved(session, old, error);
+    return false;
+  }
+  session->PutLink(AgreedLink(*session, id, revision, map, local_name));
+  ForgetRemoved(session, old);
   session->ReadHeads();
   return true;
 }
@@ -75,9 +80,13 @@ void AddToHub(SyncSession* session, const MapInfo& info, MapLink link, std::int6
   const HubHead* taken = session->HeadNamed(map.facts.info.name);
   if (taken != nullptr && taken->id != link.id && IsToBeRemoved(*session, *taken)) {
     if (AdoptEqualMap(session, map, *taken, info.name)) return;
-    session->SendItems(map);  // So that the hub is not long without both.
-    FreeNameOnHub(session, *taken);
-    taken = session->HeadNamed(map.facts.info.name);
+    // A crash after the hub has saved the map must not make a second one of it.
+    link.local_name = info.name;
+    session->PutLink(link);
+    if (SendInPlaceOf(session, *taken, map, link.id, base, info.name)) {
+      session->Say(QuotedName(map.facts.info.name) + " was added to the hub");
+      return;
+    }
   }
   if (taken != nullptr && taken->id != link.id) {
     if (AdoptEqualMap(session, map, *taken, info.name)) return;
@@ -96,8 +105,7 @@ void AddToHub(SyncSession* session, const MapInfo& info, MapLink link, std::int6
   } else {
     link.local_name = info.name;
   }
-  // A crash after the hub has saved the map must not make a second one of it.
-  session->PutLink(link);
+  session->PutLink(link);  // Before the map is sent, as above.
   SendAndLink(session, map, link.id, base, link.local_name);
   session->Say(QuotedName(map.facts.info.name) + " was added to the hub");
 }
@@ -124,9 +132,10 @@ void SaveChanges(SyncSession* session, const MapInfo& info, const MapLink& link,
       agreed.stamp.clear();
       session->PutLink(agreed);
     }
-    if (!FreeNameOnHub(session, *taken)) return;
+    if (!SendInPlaceOf(session, *taken, mine, link.id, base, info.name)) return;
+  } else {
+    SendAndLink(session, mine, link.id, base, info.name);
   }
-  SendAndLink(session, mine, link.id, base, info.name);
   session->Say(QuotedName(mine.facts.info.name) + " was saved on the hub as revision " +
                std::to_string(base + 1));
 }
@@ -256,9 +265,12 @@ void PushRemovals(SyncSession* session, const std::vector<MapInfo>& before, bool
                           " was removed here and changed on the hub, where it stays");
     } else {
       try {
-        RemoveFromHub(session, *head);
-      } catch (const HubConflict& error) {
-        session->SayProblem(QuotedName(head->name) + " was not removed from the hub: " + error.what());
+        session->hub().RemoveMap(head->id, head->revision);
+        ForgetRemoved(session, *head);
+      } catch (const HubUnreachable&) {
+        throw;
+      } catch (const Error& error) {
+        SayNotRemoved(session, *head, error);
       }
     }
   }

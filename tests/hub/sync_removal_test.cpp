@@ -9,6 +9,7 @@
 
 #include "maps/hub/hub.h"
 #include "tests/hub/hub_samples.h"
+#include "tests/hub/private_server.h"
 #include "tests/hub/two_devices.h"
 
 // Maps that are removed on one device, or replaced by others, and then on the hub.
@@ -89,6 +90,66 @@ TEST_F(HubRemoval, AMapGetsTheNameOfOneThatIsRemovedByTheSamePush) {
   EXPECT_THAT(Push(options).lines, testing::IsEmpty());
   PullTo("b");
   EXPECT_EQ(NamesIn(Open("a")), "Desk");
+  EXPECT_EQ(DifferenceOf("Desk", folder_ / "a", folder_ / "b"), "");
+}
+
+// Lets the hub refuse each further revision of a map that does not fulfil the condition.
+void DemandOfRevisions(const std::string& url, const std::string& condition) {
+  RunHubSql(url, "ALTER TABLE docent.revisions ADD CONSTRAINT demanded CHECK (" + condition + ") NOT VALID");
+}
+void DemandNothing(const std::string& url) {
+  RunHubSql(url, "ALTER TABLE docent.revisions DROP CONSTRAINT demanded");
+}
+
+TEST_F(HubRemoval, AMapStaysOnTheHubWhenTheNewOneOfItsNameIsRefused) {
+  ShareMap("Desk");
+  {
+    Library a = Open("a");
+    a.Remove(a.FindByName("Desk").key);
+    AddSampleMap(&a, "Desk", 8);
+  }
+  DemandOfRevisions(Url(), "revision > 1");  // As the one that removes the map on the hub.
+  SyncOptions options = SampleSync(Url(), folder_ / "a");
+  options.remove = true;
+  const SyncReport refused = Push(options);
+  EXPECT_GT(refused.problems, 0);
+  EXPECT_THAT(LinesOf(refused), HasSubstr("'Desk' was not saved on the hub"));
+  const std::vector<HubHead> heads = Hub(Url()).Heads();
+  ASSERT_EQ(heads.size(), 1u);
+  EXPECT_FALSE(heads[0].removed);
+  DemandNothing(Url());
+  const SyncReport report = Push(options);
+  EXPECT_EQ(report.problems, 0) << LinesOf(report);
+  PullTo("b");
+  EXPECT_EQ(NamesIn(Open("b")), "Desk");
+  EXPECT_EQ(DifferenceOf("Desk", folder_ / "a", folder_ / "b"), "");
+}
+
+TEST_F(HubRemoval, AMapStaysOnTheHubWhenAnotherOneDoesNotGetItsName) {
+  ShareMap("Desk");
+  {
+    Library a = Open("a");
+    AddSampleMap(&a, "Shelf", 9);
+  }
+  PushFrom("a");
+  PullTo("b");
+  {
+    Library a = Open("a");
+    a.Remove(a.FindByName("Desk").key);
+    ExtendMap(&a, a.FindByName("Shelf").key, {0.1, 0, 0}, 51);
+    a.Rename(a.FindByName("Shelf").key, "Desk");
+  }
+  // The second revision of each is its new structure or its removal, the third one the new name.
+  DemandOfRevisions(Url(), "revision < 3");
+  SyncOptions options = SampleSync(Url(), folder_ / "a");
+  options.remove = true;
+  EXPECT_GT(Push(options).problems, 0);
+  for (const HubHead& head : Hub(Url()).Heads()) EXPECT_FALSE(head.removed) << head.name;
+  DemandNothing(Url());
+  const SyncReport report = Push(options);
+  EXPECT_EQ(report.problems, 0) << LinesOf(report);
+  PullTo("b");
+  EXPECT_EQ(NamesIn(Open("b")), "Desk");
   EXPECT_EQ(DifferenceOf("Desk", folder_ / "a", folder_ / "b"), "");
 }
 
