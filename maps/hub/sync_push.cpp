@@ -153,6 +153,7 @@ void MergeAndSave(SyncSession* session, const MapInfo& info, const MapLink& link
   const ItemBytes scene = session->Receive({{"scene", theirs->manifest.at("scene")}}, mine);
   Resolution resolution = Resolve(link, mine, *theirs, SceneOf(scene), session->options().merge);
   if (resolution.needs_two_maps) {
+    session->SendItems(mine);  // Almost all that AddToHub needs, while a session can still begin.
     const SessionLock lock = session->local().LockForReplacing();
     const MapLink split = SplitOff(session, link);
     AddToHub(session, session->local().library().Find(info.key), split, 0);

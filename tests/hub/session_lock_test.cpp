@@ -98,6 +98,20 @@ TEST_F(HubSessionLock, ASessionCanBeginDuringATransfer) {
   EXPECT_EQ(can_begin, true) << "a pull of a map that both sides have changed";
 }
 
+TEST_F(HubSessionLock, ASessionCanBeginWhileTheKeyframesOfASecondMapAreSent) {
+  {
+    Library a = OpenSampleLibrary(folder_ / "a"), b = OpenSampleLibrary(folder_ / "b");
+    ExtendMap(&a, a.FindByName("Desk").key, {0.1, 0, 0}, 51);
+    ExtendMap(&b, b.FindByName("Desk").key, {0.2, 0, 0}, 52);
+  }
+  Push(SampleSync(Url(), folder_ / "a"));
+  std::optional<bool> can_begin;
+  const SyncReport report = Push(TryingASession(SampleSync(Url(), folder_ / "b"), &can_begin));
+  EXPECT_EQ(report.problems, 0) << LinesOf(report);
+  EXPECT_THAT(LinesOf(report), HasSubstr("both versions are kept"));
+  EXPECT_EQ(can_begin, true);
+}
+
 TEST_F(HubSessionLock, APushDoesNotMergeWhatASessionWouldUndo) {
   AddSign("a", "sign-2", "from a");
   Push(SampleSync(Url(), folder_ / "a"));
