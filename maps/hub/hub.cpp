@@ -334,7 +334,9 @@ std::vector<HubTour> Hub::Tours() {
         tour.stops.push_back(CheckedMapId(stop.get<std::string>()));
       }
       tour.removed = rows.Truth(i, 5);
-      if (!ProblemOf({tour.name, {}, tour.language, tour.minutes}).empty())
+      // A hub takes longer languages than a library. PullTour refuses such a tour, and not all others too.
+      if (!ProblemOf(Tour{tour.name, {}, tour.language.substr(0, kMaxTourLanguageBytes), tour.minutes})
+               .empty())
         RefuseRow("a tour that is not valid");
       tours.push_back(std::move(tour));
     }

@@ -23,7 +23,7 @@ inline constexpr int kHubVersion = 2;  // Of the tables; schema/version_N.sql ma
 struct HubTour {
   std::string name;
   std::int64_t revision = 0;       // From 1.
-  std::string language;            // As Tour::language.
+  std::string language;            // As Tour::language, but other clients may have saved a longer one.
   int minutes = 0;                 // As Tour::minutes.
   std::vector<std::string> stops;  // Ids of maps.
   bool removed = false;

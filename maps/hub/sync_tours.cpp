@@ -5,6 +5,7 @@
 #include "maps/hub/restored_links.h"
 #include "maps/hub/sync_session.h"
 #include "maps/library/map_names.h"
+#include "maps/storage/tour_rows.h"
 
 namespace docent::maps {
 
@@ -165,6 +166,9 @@ void PullTour(SyncSession* session, const HubTour& theirs, const std::vector<Tou
     if (link != nullptr) session->RemoveTour(theirs.name);
     return;
   }
+  if (const std::string fault = ProblemOf(Tour{theirs.name, {}, theirs.language, theirs.minutes});
+      !fault.empty())
+    throw Error(fault);
   const bool is_equal = here != nullptr && content == ContentOf(theirs);
   if (here != nullptr && !is_unchanged && !is_equal) {
     if (link != nullptr && link->revision == theirs.revision) return;  // Still to be pushed.

@@ -15,8 +15,6 @@ namespace docent::maps {
 
 namespace {
 
-constexpr std::size_t kMaxTagBytes = 35;
-
 Bytes EncodeStops(const std::vector<std::uint64_t>& stops) {
   ByteWriter writer;
   for (const std::uint64_t stop : stops) writer.Put(stop);
@@ -48,9 +46,8 @@ bool IsPrintable(const std::string& text) {
 
 // The alphabet of a tag in lower case; what it means is known to the content library only.
 bool CanBeTag(const std::string& text) {
-  return text.size() <= kMaxTagBytes && std::all_of(text.begin(), text.end(), [](char c) {
-           return (c >= 'a' && c <= 'z') || (c >= '0' && c <= '9') || c == '-';
-         });
+  return std::all_of(text.begin(), text.end(),
+                     [](char c) { return (c >= 'a' && c <= 'z') || (c >= '0' && c <= '9') || c == '-'; });
 }
 
 // Adds or replaces the tour of this name.
@@ -79,6 +76,8 @@ std::string ProblemOf(const Tour& tour) {
   if (tour.name.empty() || tour.name.size() > kMaxTourNameBytes || !IsPrintable(tour.name))
     return "its name does not have 1 to " + std::to_string(kMaxTourNameBytes) +
            " bytes, or has control characters";
+  if (tour.language.size() > kMaxTourLanguageBytes)
+    return "its language has more than " + std::to_string(kMaxTourLanguageBytes) + " bytes";
   if (!CanBeTag(tour.language)) return "its language is no language tag";
   if (tour.minutes < 0 || tour.minutes > kMaxTourMinutes)
     return "its minutes are not between 0 and " + std::to_string(kMaxTourMinutes);

@@ -25,9 +25,10 @@ struct Tour {
   bool operator==(const Tour& other) const = default;
 };
 
-inline constexpr std::size_t kMaxTourNameBytes = 200;  // Of one tour.
-inline constexpr std::size_t kMaxTourStops = 1000;     // Of one tour.
-inline constexpr int kMaxTourMinutes = 24 * 60;        // Of one tour.
+inline constexpr std::size_t kMaxTourNameBytes = 200;     // Of one tour.
+inline constexpr std::size_t kMaxTourLanguageBytes = 35;  // Of the tag; RFC 5646, section 4.4.1.
+inline constexpr std::size_t kMaxTourStops = 1000;        // Of one tour.
+inline constexpr int kMaxTourMinutes = 24 * 60;           // Of one tour.
 
 // Why the values are invalid, as the end of a sentence about the tour ("its name ..."); empty if they are
 // valid. Invalid values are neither written nor read.

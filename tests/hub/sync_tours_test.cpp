@@ -91,6 +91,28 @@ TEST_F(HubTours, ATourWhoseLanguageIsInCapitalsOnTheHubIsPulled) {
   EXPECT_THAT(PushFrom("b").lines, testing::IsEmpty());
 }
 
+TEST_F(HubTours, ATourWhoseLanguageIsTooLongForALibraryKeepsNoOtherTourAway) {
+  {
+    Library a = Open("a");
+    const std::uint64_t desk = AddSampleMap(&a, "Desk", 1);
+    a.ChangeTours([&](std::vector<Tour>* tours) {
+      for (const char* name : {"Long", "Short"}) tours->push_back({name, {desk}, "", 20});
+    });
+  }
+  PushFrom("a");
+  // As another client may have saved it.
+  RunHubSql(
+      Url(),
+      "UPDATE docent.tours SET language = 'en-x-aaaaaaaa-bbbbbbbb-cccccccc-dddddddd' WHERE name = 'Long'");
+  const SyncReport report = PullTo("b");
+  EXPECT_EQ(report.problems, 1);
+  EXPECT_THAT(LinesOf(report), HasSubstr("The tour 'Long' was not updated: its language has more than 35"));
+  const std::vector<Tour> tours = Open("b").Tours();
+  ASSERT_EQ(tours.size(), 1u);
+  EXPECT_EQ(tours[0].name, "Short");
+  EXPECT_EQ(PushFrom("b").problems, 0);
+}
+
 TEST_F(HubTours, ATourThatIsDamagedHereStaysOnTheHub) {
   {
     Library a = Open("a");

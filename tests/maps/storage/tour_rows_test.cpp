@@ -73,6 +73,11 @@ TEST_F(Tours, AreNotWrittenIfInvalid) {
     EXPECT_NE(ErrorOf([&] { Add(tour); }), "") << tour.name;
   }
   EXPECT_EQ(ProblemOf(short_), "");
+  Tour tagged = short_;
+  tagged.language = std::string(kMaxTourLanguageBytes, 'a');
+  EXPECT_EQ(ProblemOf(tagged), "");
+  tagged.language += 'a';
+  EXPECT_EQ(ProblemOf(tagged), "its language has more than 35 bytes");
   Tour nowhere = short_;
   nowhere.stops = {2, 9};
   EXPECT_THAT(ErrorOf([&] { Add(nowhere); }), HasSubstr("no map with the key 9"));
