@@ -9,6 +9,7 @@
 
 #include "app/session/library_scene.h"
 #include "maps/hub/hub_follower.h"
+#include "maps/hub/hub_pusher.h"
 #include "tests/app/support/simulated_session.h"
 #include "tests/hub/hub_samples.h"
 #include "tests/hub/private_server.h"
@@ -69,12 +70,13 @@ class HubFollow : public WithHubServer {
     Push(SampleSync(Url(), folder_ / "a"));
     Pull(SampleSync(Url(), folder_ / "b"));
   }
+  void ChangeText(const std::string& text) {
+    Library a = OpenSampleLibrary(folder_ / "a");
+    EditScene(&a, a.FindByName("Desk").key,
+              [&](content::Scene* scene) { scene->entities[0].signpost.text = text; });
+  }
   void PushText(const std::string& text) {
-    {
-      Library a = OpenSampleLibrary(folder_ / "a");
-      EditScene(&a, a.FindByName("Desk").key,
-                [&](content::Scene* scene) { scene->entities[0].signpost.text = text; });
-    }
+    ChangeText(text);
     Push(SampleSync(Url(), folder_ / "a"));
   }
   // What a tour reads, which opens the library read-only.
@@ -99,6 +101,27 @@ TEST_F(HubFollow, AChangeArrivesBeforeTheFollowerAsksForIt) {
   }
   // The library is written before the follower says so.
   EXPECT_TRUE(WaitUntil([&] { return told.Pulled() >= 3; }, kLongest));
+}
+
+TEST_F(HubFollow, WhatASessionSavesArrivesBeforeTheFollowerAsksForIt) {
+  ShareMap();
+  Told told, pushed;
+  HubFollower follower(SampleSync(Url(), folder_ / "b"), told.Callbacks());
+  ASSERT_TRUE(
+      WaitUntil([&] { return told.All().find("connected to the hub") != std::string::npos; }, kLongest))
+      << told.All();
+  HubPusher pusher(SampleSync(Url(), folder_ / "a"), pushed.Callbacks().told);
+  // All together, so that a moment in which the machine does something else counts little.
+  constexpr int kRounds = 4;
+  const auto start = Clock::now();
+  for (int round = 0; round < kRounds; ++round) {
+    ChangeText(std::to_string(round));
+    pusher.LibraryWasSaved();
+    ASSERT_TRUE(WaitUntil([&] { return TextOnB() == std::to_string(round); }, kLongest))
+        << pushed.All() << told.All();
+  }
+  EXPECT_LT(Clock::now() - start, kRounds * kUntilItAsks) << pushed.All() << told.All();
+  EXPECT_TRUE(pusher.Finish()) << pushed.All();
 }
 
 TEST_F(HubFollow, AHubThatIsGoneIsFoundAgain) {
