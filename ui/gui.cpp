@@ -9,6 +9,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <deque>
 #include <filesystem>
 #include <string>
 #include <utility>
@@ -54,15 +55,30 @@ struct Gui::Impl {
   int focus_frames = 0;  // During which a window that FocusWindow chose keeps the keyboard in any case.
   int leave_frames = 0;  // Until the field is left that LeaveField leaves; 0 for none.
 
-  std::string window_to_focus;  // By the next frame; empty for none.
-  bool clicks = false;          // In the next frame.
+  std::string window_to_focus;         // By the next frame; empty for none.
+  std::deque<Eigen::Vector2d> clicks;  // That are to be given to Dear ImGui.
+  bool holds_click = false;            // The first of these holds the button in the present frame.
 
   void Use() const { ImGui::SetCurrentContext(context); }
+  // After the mouse was asked for its state, and before the frame that sees it begins.
+  void GiveClick();
   // Within a frame, because Dear ImGui forgets such requests between frames.
   void Focus();
   // Within a frame too: only a field that loses the keyboard there says that it was changed.
   void Leave();
 };
+
+void Gui::Impl::GiveClick() {
+  if (clicks.empty()) return;
+  ImGuiIO& io = ImGui::GetIO();
+  io.MousePos = ImVec2(static_cast<float>(clicks.front().x()), static_cast<float>(clicks.front().y()));
+  holds_click = !holds_click;
+  if (holds_click) {
+    io.MouseDown[ImGuiMouseButton_Left] = true;
+  } else {
+    clicks.pop_front();  // This frame has the state of the mouse again, so that the button is released.
+  }
+}
 
 void Gui::Impl::Focus() {
   const std::string name = std::exchange(window_to_focus, {});
@@ -117,8 +133,7 @@ void Gui::Begin(double scale) {
   }
   ImGui_ImplGlfw_NewFrame();
   impl_->keys.Update(impl_->window);
-  // The next frame has the state of the mouse again, so that the button is released.
-  if (std::exchange(impl_->clicks, false)) ImGui::GetIO().MouseDown[ImGuiMouseButton_Left] = true;
+  impl_->GiveClick();
   ImGui::NewFrame();
   impl_->Focus();
   impl_->Leave();
@@ -135,13 +150,24 @@ void Gui::Draw() {
   ImGui_ImplOpenGL3_RenderDrawData(ImGui::GetDrawData());
 }
 
-bool Gui::WantsMouse() const {
+// Dear ImGui says at the beginning of a frame whether it wants the mouse, so that what it has said is not
+// true for a pointer that has moved since. This is how it decides then.
+bool Gui::WantsMouse(const Eigen::Vector2d& point) const {
   impl_->Use();
-  return ImGui::GetIO().WantCaptureMouse;
+  if (HasPopup()) return true;
+  // A pointer that is held belongs to what it was pressed on.
+  if (ImGui::IsAnyMouseDown() && !impl_->holds_click) return ImGui::GetIO().WantCaptureMouse;
+  const ImVec2 at(static_cast<float>(point.x()), static_cast<float>(point.y()));
+  for (const ImGuiWindow* window : impl_->context->Windows) {
+    const bool is_shown = impl_->context->WithinFrameScope ? window->WasActive : window->Active;
+    const bool takes = is_shown && !window->Hidden && (window->Flags & ImGuiWindowFlags_NoMouseInputs) == 0;
+    if (takes && window->OuterRectClipped.Contains(at)) return true;
+  }
+  return false;
 }
 
-void Gui::Click() {
-  impl_->clicks = true;
+void Gui::Click(const Eigen::Vector2d& point) {
+  impl_->clicks.push_back(point);
 }
 
 bool Gui::WritesText() const {

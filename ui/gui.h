@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <Eigen/Core>
 #include <memory>
 
 #include "ui/window.h"
@@ -23,10 +24,12 @@ class Gui {
   // Ends the frame and draws the widgets into the default framebuffer.
   void Draw();
 
-  // Whether the pointer is over a widget or held by one; such events are not those of the image.
-  bool WantsMouse() const;
-  // Clicks in the next frame where the pointer is then, as with the left button of a mouse.
-  void Click();
+  // Whether a pointer at this point is over a widget or held by one; such events are not those of the image.
+  // It counts what the last frame shows, wherever the pointer was then.
+  bool WantsMouse(const Eigen::Vector2d& point) const;
+  // Clicks at this point, as with the left button of a mouse: holds it in the next frame and releases it in
+  // the one after, also if the pointer moves on. Further clicks follow in their order.
+  void Click(const Eigen::Vector2d& point);
   // Whether keys write into a text field.
   bool WritesText() const;
   // Whether a drop-down or dialog is open, which Escape closes.

@@ -183,7 +183,7 @@ void AuthorControls::Handle(const ui::InputEvent& event) {
   // What comes after the wish to quit changes nothing. Fields still get their keys, which do not come here.
   if (quit_dialog_.is_open() || is_quitting_ || ending_ != Ending::kNone) return;
   if (event.kind == Kind::kKey) HandleKey(event);
-  if (event.kind == Kind::kClick && event.button == 0 && !gui_.WantsMouse()) HandleClick(event);
+  if (event.kind == Kind::kClick && event.button == 0 && !gui_.WantsMouse(event.position)) HandleClick(event);
   if (event.kind == Kind::kDrop) HandleDrop(event);
 }
 
@@ -251,12 +251,12 @@ bool AuthorControls::HandlePointerKey(const ui::InputEvent& event) {
     return true;
   }
   if (event.key != "enter" || event.repeated) return false;
-  if (gui_.WantsMouse()) {
-    gui_.Click();
-    return true;
-  }
   ui::InputEvent click = event;
   click.position = window_->PointerPosition();
+  if (gui_.WantsMouse(click.position)) {
+    gui_.Click(click.position);
+    return true;
+  }
   HandleClick(click);
   pointer_.Release();
   return true;
@@ -347,7 +347,7 @@ void AuthorControls::UpdatePreview() {
   const Eigen::Vector2d point = window_->PointerPosition();
   ghost_note_.clear();
   const bool shows_ghost = IsPlacing() && !fitting_.is_active() && !panel_.choices().from_above &&
-                           !gui_.WantsMouse() && view_.ShowsImageAt(point);
+                           !gui_.WantsMouse(point) && view_.ShowsImageAt(point);
   preview_ = shows_ghost ? ghost_.AddTo(view_.scene, view_, panel_.choices(), view_.PixelAt(point),
                                         TrailEnd(), &ghost_note_)
                          : pointer_.Preview(view_.scene);
@@ -517,7 +517,7 @@ void AuthorControls::Paste() {
   RememberNames();
   PasteEntities command{copied_names_, copied_from_, std::nullopt};
   const Eigen::Vector2d point = window_->PointerPosition();
-  if (!panel_.choices().from_above && !gui_.WantsMouse() && view_.ShowsImageAt(point))
+  if (!panel_.choices().from_above && !gui_.WantsMouse(point) && view_.ShowsImageAt(point))
     command.to_pixel = view_.PixelAt(point);
   Emit(std::move(command));
 }

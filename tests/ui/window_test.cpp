@@ -122,9 +122,12 @@ TEST_F(InterfaceOnScreen, TellsClicksInTheImageFromThoseInThePanel) {
   EXPECT_EQ(events_[0].kind, InputEvent::Kind::kClick);
   EXPECT_LT((events_[0].position - Eigen::Vector2d(200, 300)).norm(), 1);
   EXPECT_EQ(events_[1].kind, InputEvent::Kind::kRelease);
-  EXPECT_FALSE(gui_->WantsMouse());
-  Click({layout_.panel.x + 0.5 * layout_.panel.width, 590});
-  EXPECT_TRUE(gui_->WantsMouse());
+  const Eigen::Vector2d panel(layout_.panel.x + 0.5 * layout_.panel.width, 590);
+  EXPECT_FALSE(gui_->WantsMouse({200, 300}));
+  EXPECT_TRUE(gui_->WantsMouse(panel)) << "the pointer was not there in a frame";
+  Click(panel);
+  EXPECT_FALSE(gui_->WantsMouse({200, 300}));
+  EXPECT_TRUE(gui_->WantsMouse(panel));
 }
 
 TEST_F(InterfaceOnScreen, EnterInTheNameStartsTheMap) {

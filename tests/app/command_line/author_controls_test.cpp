@@ -83,6 +83,26 @@ class AuthorAtControls : public ::testing::Test {
     return {right - 25, image.bottom() - 12 - 14};
   }
   void ClickUndo() { person_.Click(UndoButton()); }
+  // While no frame is drawn.
+  static void MovePointer(const Eigen::Vector2d& point) {
+    const std::string move = "xdotool mousemove " + std::to_string(std::lround(point.x())) + " " +
+                             std::to_string(std::lround(point.y()));
+    ASSERT_EQ(std::system(move.c_str()), 0);
+  }
+  // The key as the window reports it, without a frame.
+  void HandleEnter() {
+    ui::InputEvent enter;
+    enter.key = "enter";
+    controls_->Handle(enter);
+  }
+  // The pointer was there in the last frame.
+  void ShowMessageWithPointerAt(const Eigen::Vector2d& point) {
+    SetLens();
+    controls_->Take({Notice{"", RenameEntity{"sign-1", "Cove"}}});
+    MovePointer(point);
+    Draw(5);
+    controls_->choices().pick = ui::MapPick::kFloor;
+  }
   void ClickPixel(const Eigen::Vector2d& pixel) {
     const Eigen::Vector2i size = window_->WindowSize();
     const ui::WindowLayout layout = ui::LayOutWindow(size.x(), size.y(), 1, controls_->choices().panel_open);
@@ -408,17 +428,41 @@ TEST_F(AuthorAtControls, WhatWasDoneIsUndoneByTheButtonOfItsMessage) {
 }
 
 TEST_F(AuthorAtControls, EnterPressesTheButtonUnderThePointerAndPlacesNothingBehindIt) {
-  SetLens();
-  controls_->Take({Notice{"", RenameEntity{"sign-1", "Cove"}}});
-  Draw(3);
-  const Eigen::Vector2d button = UndoButton();
-  const std::string move = "xdotool mousemove " + std::to_string(std::lround(button.x())) + " " +
-                           std::to_string(std::lround(button.y()));
-  ASSERT_EQ(std::system(move.c_str()), 0);
-  Draw(5);
-  controls_->choices().pick = ui::MapPick::kFloor;
+  ShowMessageWithPointerAt(UndoButton());
   PressReturn();
   EXPECT_THAT(commands_, ElementsAre(Command(Undo{})));
+}
+
+TEST_F(AuthorAtControls, EnterPressesTheButtonThatThePointerHasReachedSinceTheLastFrame) {
+  ShowMessageWithPointerAt({300, 400});
+  MovePointer(UndoButton());
+  HandleEnter();
+  Draw(5);
+  EXPECT_THAT(commands_, ElementsAre(Command(Undo{})));
+}
+
+TEST_F(AuthorAtControls, EnterClicksInTheImageThatThePointerHasReachedSinceTheLastFrame) {
+  ShowMessageWithPointerAt(UndoButton());
+  MovePointer({300, 400});
+  HandleEnter();
+  Draw(5);
+  ASSERT_EQ(commands_.size(), 1u);
+  EXPECT_TRUE(std::holds_alternative<SetMapUp>(commands_[0]));
+}
+
+TEST_F(AuthorAtControls, EnterPressesTheButtonAlthoughThePointerMovesOnBeforeTheNextFrame) {
+  ShowMessageWithPointerAt(UndoButton());
+  HandleEnter();
+  MovePointer({300, 400});
+  Draw(5);
+  EXPECT_THAT(commands_, ElementsAre(Command(Undo{})));
+}
+
+TEST_F(AuthorAtControls, AClickInTheImageCountsAlthoughThePointerWasOverAButtonInTheLastFrame) {
+  ShowMessageWithPointerAt(UndoButton());
+  ClickPixel({200, 240});
+  ASSERT_EQ(commands_.size(), 1u);
+  EXPECT_TRUE(std::holds_alternative<SetMapUp>(commands_[0]));
 }
 
 TEST_F(AuthorAtControls, TheButtonOfAMessageUndoesNothingOfAnotherMap) {
