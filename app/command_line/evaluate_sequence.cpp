@@ -66,11 +66,7 @@ void AddMaps(const std::vector<Session::MapState>& maps, const std::filesystem::
              bool one_of_many, RunRecord* record, std::vector<ShownPanorama>* panoramas) {
   for (const Session::MapState& map : maps) {
     if (!map.snapshot) continue;
-    record->maps.push_back(MakeMapRecord(map.key, map.name, *map.snapshot));
-    record->maps.back().discarded = map.discarded;
-    for (const Session::MapState& other : maps) {
-      if (other.key == map.joined_into) record->maps.back().joined_into = other.name;
-    }
+    record->maps.push_back(RecordOfMap(map, maps));
     if (map.discarded || map.joined_into != 0 || one_of_many) continue;
     if (has_truth) record->maps.back().adjusted_centers = AdjustedCenters(*map.snapshot);
     StitchMap(folder, map, panoramas);
@@ -90,6 +86,15 @@ void CheckStarts(const EvaluateOptions& options, const EvaluatedSequence& sequen
 }
 
 }  // namespace
+
+MapRecord RecordOfMap(const Session::MapState& map, const std::vector<Session::MapState>& maps) {
+  MapRecord record = MakeMapRecord(map.key, map.name, *map.snapshot);
+  record.discarded = map.discarded;
+  for (const Session::MapState& other : maps) {
+    if (other.key == map.joined_into) record.joined_into = other.name;
+  }
+  return record;
+}
 
 EvaluatedSequence DescribeSequence(const EvaluateOptions& options, std::size_t index) {
   EvaluatedSequence sequence;

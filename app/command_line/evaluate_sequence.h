@@ -13,6 +13,7 @@
 #include "app/evaluation/ground_truth.h"
 #include "app/evaluation/run_distribution.h"
 #include "app/session/calibrated_camera.h"
+#include "app/session/session.h"
 #include "app/simulator/simulation.h"
 
 // One sequence of `docent evaluate`: how it is opened for each run, and how it is run.
@@ -50,6 +51,9 @@ std::optional<std::vector<InitializationResult>> ClassifyInitializationsOf(const
 // `window_frames` (0: to the end of the sequence) fit, each beginning at a different frame, all of them lie
 // within the sequence and have the same length; otherwise later windows are shorter.
 std::vector<std::uint64_t> FirstFrames(std::size_t starts, std::uint64_t frames, std::uint64_t window_frames);
+
+// The record of one of a session's maps, which must have a snapshot. `maps`: all of them.
+MapRecord RecordOfMap(const Session::MapState& map, const std::vector<Session::MapState>& maps);
 
 // The requested runs, ordered by start, then seed.
 std::vector<RunKey> RunsOf(const EvaluateOptions& options, const EvaluatedSequence& sequence);

@@ -425,7 +425,7 @@ void GuideRun::HandleFrame(const engine::TrackedFrame& tracked, const Show& show
     files_->Add(events);
     Warn(events);
     ReportProblem(files_->TakeProblem(), tracked.frame.time);
-    if (request_.on_frame) request_.on_frame(*frame);
+    if (request_.on_frame) request_.on_frame(*frame, session_.MappingTimes());
   }
   for (const auto& head : heads_) head->AddView(tracked);
   if (tracked.frame.camera == 0) Direct(frame);

@@ -165,7 +165,7 @@ void RunTour(const TourOptions& options, Verbosity verbosity) {
     if (!options.run.language && !tour.language.empty()) request.language = tour.language;
   }
   std::uint64_t frames = 0, localized = 0;
-  request.on_frame = [&](const ShownFrame& frame) {
+  request.on_frame = [&](const ShownFrame& frame, const engine::MapperTimes&) {
     ++frames;
     if (engine::HasPose(frame.tracked.state)) ++localized;
   };

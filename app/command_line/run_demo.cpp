@@ -11,6 +11,7 @@
 
 #include "app/cameras/clipped_source.h"
 #include "app/cameras/simulated_source.h"
+#include "app/command_line/evaluate_sequence.h"
 #include "app/command_line/interruption.h"
 #include "app/command_line/map_panel.h"
 #include "app/command_line/run_guide.h"
@@ -92,9 +93,10 @@ class DemoRun {
   void Run(GuideRequest request, Verbosity verbosity) {
     const auto start = std::chrono::steady_clock::now();
     RunRecorder recorder;
-    request.on_frame = [&, next = std::move(request.on_frame)](const ShownFrame& frame) {
-      recorder.Add(frame.tracked);
-      if (next) next(frame);
+    request.on_frame = [&, next = std::move(request.on_frame)](const ShownFrame& frame,
+                                                               const engine::MapperTimes& mapping) {
+      recorder.Add(frame.tracked, MakeMappingTimes(mapping));
+      if (next) next(frame, mapping);
     };
     const Timestamp begin = simulation_->time(0);
     auto source = OpenSimulation(simulation_);
@@ -104,11 +106,11 @@ class DemoRun {
         ClipSource(std::move(source), simulation_->time(first_frame_) - begin, until), std::nullopt);
     maps_ = RunGuide(request, {&camera, 1}, verbosity);
     if (Interruption::requested()) throw Error("Interrupted; the demonstration is incomplete.");
+    run_.run.engine = ToString(request.engine);
     run_.run.frames = recorder.frames();
+    if (!run_.run.frames.empty()) run_.run.mapping = run_.run.frames.back().mapping;
     for (const Session::MapState& map : maps_) {
-      if (!map.snapshot) continue;
-      run_.run.maps.push_back(MakeMapRecord(map.key, map.name, *map.snapshot));
-      run_.run.maps.back().discarded = map.discarded;
+      if (map.snapshot) run_.run.maps.push_back(RecordOfMap(map, maps_));
     }
     run_.run.wall_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
     run_.run.peak_memory_mb = PeakMemoryMegabytes();
@@ -218,7 +220,7 @@ void RunDemo(const DemoOptions& options, Verbosity verbosity) {
     request.title = "Docent demonstration - the tour";
     request.record = options.record ? *options.record : folder / "tour.mp4";
     TourImages images(folder);
-    request.on_frame = [&](const ShownFrame& frame) { check.Add(frame); };
+    request.on_frame = [&](const ShownFrame& frame, const engine::MapperTimes&) { check.Add(frame); };
     request.on_image = [&](const ShownFrame& frame, const cv::Mat& image) { images.Add(frame, image); };
     tour.Run(std::move(request), verbosity);
   }

@@ -16,6 +16,7 @@
 #include "app/session/frame_loop.h"
 #include "app/session/guided_view.h"
 #include "app/session/route_state.h"
+#include "engine/mapping/mapper_output.h"
 #include "maps/hub/sync.h"
 #include "maps/library/library.h"
 
@@ -69,8 +70,9 @@ struct GuideRequest {
   bool room_light = true;                              // See SessionOptions.
   std::shared_ptr<const engine::PlanarTarget> target;  // See engine::TrackerOptions; may be null.
   std::optional<HeadPolicy> head;
-  // Called with each frame on its camera's thread, never concurrently; may be empty.
-  std::function<void(const ShownFrame&)> on_frame;
+  // Called with each frame, and with the time that mapping has taken since the beginning, on the camera's
+  // thread, never concurrently; may be empty.
+  std::function<void(const ShownFrame&, const engine::MapperTimes&)> on_frame;
   // Called with each drawn frame and its image on the drawing thread; may be empty. Without a window, frames
   // are drawn only for this and for `record`.
   std::function<void(const ShownFrame&, const cv::Mat&)> on_image;

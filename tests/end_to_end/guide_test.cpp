@@ -244,6 +244,11 @@ TEST(Guide, TheDemonstrationMakesMapsAndLeadsThroughThem) {
     EXPECT_THAT(ReadAll(folder / "demo" / name), StartsWith("\x89PNG\r\n")) << name;
   EXPECT_GT(std::filesystem::file_size(folder / "demo/tour.mp4"), 10000u);
   EXPECT_THAT(ReadAll(folder / "demo/report.html"), HasSubstr("tour"));
+  const auto report = nlohmann::json::parse(ReadAll(folder / "demo/report.json"));
+  const nlohmann::json& author = report.at("sequences").at(0);
+  EXPECT_EQ(author.at("name"), "author");
+  EXPECT_EQ(author.at("engine"), "hybrid");
+  EXPECT_GT(author.at("mapping_s").at("bundle_adjustment").get<double>(), 0);
 }
 
 TEST(Guide, TheDemonstrationKeepsALibraryThatIsNotItsOwn) {

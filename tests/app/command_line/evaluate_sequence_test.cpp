@@ -31,6 +31,23 @@ TEST(FirstFrames, SpreadsUnlimitedWindowsOverTheWholeSequence) {
       << "the window is longer than the sequence";
 }
 
+TEST(RecordOfMap, NamesTheMapThatAMapWasJoinedInto) {
+  std::vector<Session::MapState> maps(3);
+  for (std::size_t i = 0; i < maps.size(); ++i) {
+    maps[i].key = i + 1;
+    maps[i].snapshot = std::make_shared<const engine::MapSnapshot>();
+  }
+  maps[0].name = "Hall";
+  maps[1].name = "Hall 2";
+  maps[1].joined_into = 1;
+  maps[2].name = "Hall 3";
+  maps[2].discarded = true;
+  EXPECT_EQ(RecordOfMap(maps[0], maps).joined_into, "");
+  EXPECT_EQ(RecordOfMap(maps[1], maps).joined_into, "Hall");
+  EXPECT_FALSE(RecordOfMap(maps[1], maps).discarded);
+  EXPECT_TRUE(RecordOfMap(maps[2], maps).discarded);
+}
+
 // The record of a run that tracks the simulation perfectly and whose map has depth from a frame on.
 RunRecord RunInTruth(const Simulation& simulation, std::size_t first_depth) {
   RunRecord run;
