@@ -21,6 +21,14 @@ void VisitorFrames::Clear() {
   for (Camera& camera : cameras_) camera.last.reset();
 }
 
+void VisitorFrames::SetTrouble(std::size_t camera, const std::string& trouble) {
+  cameras_[camera].trouble = trouble;
+  if (!trouble.empty()) return;
+  // The next image would show the answer anew, however long ago it was given.
+  cameras_[camera].refusal.clear();
+  cameras_[camera].is_answer_new = false;
+}
+
 void VisitorFrames::Answer(const std::string& refusal, ShownFrame* frame) {
   Camera& camera = cameras_[CameraOf(frame->tracked)];
   if (!camera.trouble.empty()) {

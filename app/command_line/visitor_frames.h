@@ -25,8 +25,9 @@ class VisitorFrames {
   // Nothing is shown again.
   void Clear();
 
-  // Why the camera delivers no images, as a sentence; empty once it does again.
-  void SetTrouble(std::size_t camera, const std::string& trouble) { cameras_[camera].trouble = trouble; }
+  // Why the camera delivers no images, as a sentence; empty once it does again. Answers from before are
+  // forgotten then.
+  void SetTrouble(std::size_t camera, const std::string& trouble);
   // Replaces the answer that a frame shows to a visitor's last step: why it was refused; empty if it was not.
   // The trouble with the camera stays before it: without it, nothing would explain the image that stays.
   void Answer(const std::string& refusal, ShownFrame* frame);

@@ -16,8 +16,10 @@
 namespace docent::app {
 namespace {
 
+using ::testing::Each;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
+using ::testing::IsEmpty;
 using ::testing::Not;
 
 // A camera of a known calibration without images.
@@ -84,10 +86,11 @@ TEST(GuideRun, LogsTheWarningsOfATourOnce) {
   EXPECT_THAT(end.log.substr(end.log.find(warning) + 1), Not(HasSubstr(warning)));
 }
 
-// A camera that is unplugged after its first image. `away` is called meanwhile; then there is no other image.
+// A camera that is unplugged after its first image. `away` is called meanwhile. Then there is no other image,
+// or a last one if it returns.
 class UnpluggedCamera : public FrameSource {
  public:
-  explicit UnpluggedCamera(std::function<void()> away) : away_(std::move(away)) {
+  UnpluggedCamera(std::function<void()> away, bool returns) : away_(std::move(away)), returns_(returns) {
     info_.name = "unplugged";
     info_.live = true;
     info_.known_camera =
@@ -95,16 +98,19 @@ class UnpluggedCamera : public FrameSource {
   }
   bool Next(engine::Frame* frame) override {
     ++calls_;
-    frame->index = 1;
-    frame->time = Timestamp(1000);
-    if (calls_ == 1) frame->image = cv::Mat::zeros(480, 640, CV_8UC1);
+    frame->index = calls_ < 4 ? 1 : 2;
+    frame->time = Timestamp(1000) * calls_;
+    if (calls_ == 1 || calls_ == 4) frame->image = cv::Mat::zeros(480, 640, CV_8UC1);
     if (calls_ == 3) away_();
-    return calls_ < 3;
+    return calls_ < (returns_ ? 5 : 3);
   }
-  std::string trouble() const override { return calls_ < 2 ? "" : "The camera was unplugged."; }
+  std::string trouble() const override {
+    return calls_ == 2 || calls_ == 3 ? "The camera was unplugged." : "";
+  }
 
  private:
   const std::function<void()> away_;
+  const bool returns_;
   int calls_ = 0;
 };
 
@@ -113,12 +119,14 @@ TEST(GuideRun, SaysThatTheCameraIsAwayWhateverTheVisitorDoes) {
   std::vector<std::string> messages;
   std::vector<CalibratedCamera> cameras;
   cameras.push_back(
-      Calibrate(std::make_unique<UnpluggedCamera>([&] {
-                  for (const auto step : {GuideVisitor::Step::kPress, GuideVisitor::Step::kClose}) {
-                    const auto frame = run->Lead(0, GuideVisitor{step, {}});
-                    messages.push_back(frame ? frame->message : "no frame");
-                  }
-                }),
+      Calibrate(std::make_unique<UnpluggedCamera>(
+                    [&] {
+                      for (const auto step : {GuideVisitor::Step::kPress, GuideVisitor::Step::kClose}) {
+                        const auto frame = run->Lead(0, GuideVisitor{step, {}});
+                        messages.push_back(frame ? frame->message : "no frame");
+                      }
+                    },
+                    /*returns=*/false),
                 std::nullopt));
   const GuideRequest request = HeadlessRequest();
   GuideRun tour(request, cameras);
@@ -126,6 +134,30 @@ TEST(GuideRun, SaysThatTheCameraIsAwayWhateverTheVisitorDoes) {
   tour.Run([](const std::shared_ptr<const ShownFrame>&) {}, {});
   EXPECT_THAT(messages, ElementsAre("The camera was unplugged. There is nothing to open here.",
                                     "The camera was unplugged."));
+}
+
+TEST(GuideRun, ShowsNoRefusalFromBeforeTheCameraWasBack) {
+  GuideRun* run = nullptr;
+  bool was_refused = false;
+  std::vector<std::string> messages;  // Since then.
+  std::vector<CalibratedCamera> cameras;
+  cameras.push_back(Calibrate(std::make_unique<UnpluggedCamera>(
+                                  [&] {
+                                    run->Lead(0, GuideVisitor{GuideVisitor::Step::kPress, {}});
+                                    was_refused = true;
+                                  },
+                                  /*returns=*/true),
+                              std::nullopt));
+  const GuideRequest request = HeadlessRequest();
+  GuideRun tour(request, cameras);
+  run = &tour;
+  tour.Run(
+      [&](const std::shared_ptr<const ShownFrame>& frame) {
+        if (was_refused) messages.push_back(frame->message);
+      },
+      {});
+  EXPECT_THAT(messages, Not(IsEmpty()));
+  EXPECT_THAT(messages, Each(Not(HasSubstr("There is nothing to open here."))));
 }
 
 }  // namespace
