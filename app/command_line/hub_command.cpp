@@ -1,10 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "app/command_line/hub_command.h"
 
+#include <signal.h>
 #include <termios.h>
 #include <unistd.h>
 
 #include <CLI/CLI.hpp>
+#include <array>
+#include <atomic>
+#include <cerrno>
 #include <cstdio>
 #include <filesystem>
 #include <memory>
@@ -36,42 +40,92 @@ struct HubOptions {
 };
 using HubAction = void (*)(const HubOptions& options);
 
-// Hides what is typed while it exists. Keys that interrupt, end or suspend the program are characters then,
-// or the terminal would go on hiding.
+// What the handler of signals needs while a NoEcho exists.
+termios g_shown_terminal, g_hidden_terminal;
+std::atomic<bool> g_hides_typed = false;
+std::atomic<const std::string*> g_prompt = nullptr;  // Null unless an answer is awaited.
+static_assert(std::atomic<const std::string*>::is_always_lock_free,
+              "a signal handler may only use lock-free atomics");
+
+// In the handler of a signal that ends or stops the program: the terminal shows what is typed before. After a
+// stop it hides again, and the question is asked anew, since what was typed of the answer is lost.
+void OnEndOrStop(int signal) {
+  const int error = errno;
+  // In the background, others use the terminal. One that does not control the program has no foreground.
+  const pid_t foreground = tcgetpgrp(STDIN_FILENO);
+  if (foreground < 0 || foreground == getpgrp()) tcsetattr(STDIN_FILENO, TCSAFLUSH, &g_shown_terminal);
+  struct sigaction usual {};
+  struct sigaction present {};
+  usual.sa_handler = SIG_DFL;
+  sigaction(signal, &usual, &present);
+  sigset_t only, blocked;
+  sigemptyset(&only);
+  sigaddset(&only, signal);
+  raise(signal);
+  pthread_sigmask(SIG_UNBLOCK, &only, &blocked);  // Here the signal ends or stops the program.
+  pthread_sigmask(SIG_SETMASK, &blocked, nullptr);
+  sigaction(signal, &present, nullptr);
+  // In the background, this stops the program until it is in the foreground again.
+  if (g_hides_typed) tcsetattr(STDIN_FILENO, TCSAFLUSH, &g_hidden_terminal);
+  if (const std::string* const prompt = g_prompt) {
+    const auto ignored = write(STDERR_FILENO, prompt->data(), prompt->size());
+    static_cast<void>(ignored);
+  }
+  errno = error;
+}
+
+// Hides what is typed while it exists, but not while the program is stopped or after a signal has ended it.
+// The key that interrupts the program is a character then, which ends the question. One instance at a time.
 class NoEcho {
  public:
   NoEcho() : is_terminal_(tcgetattr(STDIN_FILENO, &before_) == 0) {
-    termios hidden = before_;
-    hidden.c_lflag &= ~static_cast<tcflag_t>(ECHO | ISIG);
-    hidden.c_cc[VEOL] = before_.c_cc[VINTR];  // It ends the line, so that it is read at once.
-    if (is_terminal_) tcsetattr(STDIN_FILENO, TCSAFLUSH, &hidden);
+    if (!is_terminal_) return;
+    g_shown_terminal = g_hidden_terminal = before_;
+    g_hidden_terminal.c_lflag &= ~static_cast<tcflag_t>(ECHO);
+    g_hidden_terminal.c_cc[VEOL] = before_.c_cc[VINTR];  // It ends the line, so that it is read at once.
+    g_hidden_terminal.c_cc[VINTR] = _POSIX_VDISABLE;
+    struct sigaction handled {};
+    handled.sa_handler = OnEndOrStop;
+    handled.sa_flags = SA_RESTART;
+    sigemptyset(&handled.sa_mask);
+    for (std::size_t i = 0; i < kSignals.size(); ++i) {
+      sigaction(kSignals[i], nullptr, &actions_before_[i]);
+      if (actions_before_[i].sa_handler != SIG_IGN) sigaction(kSignals[i], &handled, nullptr);
+    }
+    g_hides_typed = true;
+    tcsetattr(STDIN_FILENO, TCSAFLUSH, &g_hidden_terminal);
   }
   ~NoEcho() {
-    if (is_terminal_) tcsetattr(STDIN_FILENO, TCSAFLUSH, &before_);
+    if (!is_terminal_) return;
+    g_hides_typed = false;
+    tcsetattr(STDIN_FILENO, TCSAFLUSH, &before_);
+    for (std::size_t i = 0; i < kSignals.size(); ++i) sigaction(kSignals[i], &actions_before_[i], nullptr);
   }
   NoEcho(const NoEcho&) = delete;
   NoEcho& operator=(const NoEcho&) = delete;
   bool is_terminal() const { return is_terminal_; }
-  // Whether the character is one of those keys.
-  bool Interrupts(char c) const {
-    const auto key = static_cast<cc_t>(c);
-    return is_terminal_ &&
-           (key == before_.c_cc[VINTR] || key == before_.c_cc[VQUIT] || key == before_.c_cc[VSUSP]);
-  }
+  // Whether the character is that key.
+  bool Interrupts(char c) const { return is_terminal_ && static_cast<cc_t>(c) == before_.c_cc[VINTR]; }
 
  private:
+  static constexpr std::array kSignals = {SIGHUP, SIGINT, SIGQUIT, SIGTERM, SIGTSTP};
+
   termios before_{};
   bool is_terminal_;
+  std::array<struct sigaction, kSignals.size()> actions_before_{};
 };
 
 std::string AskedLine(const std::string& question, const NoEcho& hidden) {
-  if (hidden.is_terminal()) std::fprintf(stderr, "%s: ", question.c_str());
+  const std::string prompt = question + ": ";
+  if (hidden.is_terminal()) std::fputs(prompt.c_str(), stderr);
+  g_prompt = &prompt;
   std::string line;
   bool is_interrupted = false;
   for (int c = 0; !is_interrupted && (c = std::fgetc(stdin)) != EOF && c != '\n';) {
     line += static_cast<char>(c);
     is_interrupted = hidden.Interrupts(line.back());
   }
+  g_prompt = nullptr;
   if (hidden.is_terminal()) std::fputc('\n', stderr);
   if (is_interrupted) throw Error("Interrupted; the user was not added.");
   if (line.empty()) throw Error("No password was given on standard input; the user was not added.");

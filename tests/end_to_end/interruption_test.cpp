@@ -39,8 +39,9 @@ class RunningProgram : public ::testing::Test {
     }
   }
 
-  void Start(const std::vector<std::string>& arguments, const std::string& input = "/dev/null") {
-    child_ = StartDocent(arguments, (folder_ / "out").string(), (folder_ / "err").string(), input);
+  void Start(const std::vector<std::string>& arguments, const std::string& input = "/dev/null",
+             bool can_stop = false) {
+    child_ = StartDocent(arguments, (folder_ / "out").string(), (folder_ / "err").string(), input, can_stop);
   }
   bool IsRunning() const {
     siginfo_t ended{};
@@ -132,31 +133,86 @@ TEST_P(InterruptedProgram, WritesNoCalibration) {
   EXPECT_FALSE(std::filesystem::exists(calibration));
 }
 
-TEST_F(RunningProgram, ATerminalShowsWhatIsTypedAgainAfterAnInterruptedPassword) {
-  const int keyboard = posix_openpt(O_RDWR | O_NOCTTY);
-  if (keyboard < 0) GTEST_SKIP() << "this system has no pseudo-terminals";
-  ASSERT_EQ(grantpt(keyboard), 0);
-  ASSERT_EQ(unlockpt(keyboard), 0);
-  const std::string terminal = ptsname(keyboard);
-  // While it is open, the terminal keeps its settings when the program ends.
-  const int screen = open(terminal.c_str(), O_RDWR | O_NOCTTY);
-  ASSERT_GE(screen, 0);
-  Start({"hub", "user", "add", "anna", "--role", "curator", "--password", "--hub", "postgresql:///docent"},
-        terminal);
-  WaitUntil([this] { return Errors().find("Password of anna: ") != std::string::npos; });
-  termios settings{};
-  ASSERT_EQ(tcgetattr(screen, &settings), 0);
-  EXPECT_EQ(settings.c_lflag & ECHO, 0u);
-  ASSERT_EQ(settings.c_lflag & ISIG, 0u) << "Ctrl-C would end the program while the terminal hides";
-  constexpr char kTyped[] = "secret\x03";
-  ASSERT_EQ(write(keyboard, kTyped, sizeof kTyped - 1), static_cast<ssize_t>(sizeof kTyped - 1));
+// An administrator who is asked for the password of a new user, on a terminal that hides what is typed.
+class PasswordAtTerminal : public RunningProgram {
+ protected:
+  void SetUp() override {
+    keyboard_ = posix_openpt(O_RDWR | O_NOCTTY);
+    if (keyboard_ < 0) GTEST_SKIP() << "this system has no pseudo-terminals";
+    ASSERT_EQ(grantpt(keyboard_), 0);
+    ASSERT_EQ(unlockpt(keyboard_), 0);
+    const std::string terminal = ptsname(keyboard_);
+    // While it is open, the terminal keeps its settings when the program ends.
+    screen_ = open(terminal.c_str(), O_RDWR | O_NOCTTY);
+    ASSERT_GE(screen_, 0);
+    ASSERT_TRUE(ShowsWhatIsTyped());
+    before_ = Settings();
+    Start({"hub", "user", "add", "anna", "--role", "curator", "--password", "--hub", "postgresql:///docent"},
+          terminal, /*can_stop=*/true);
+    WaitUntil([this] { return Questions() == 1; });
+    ASSERT_EQ(Questions(), 1) << Errors();
+    ASSERT_FALSE(ShowsWhatIsTyped());
+  }
+  void TearDown() override {
+    RunningProgram::TearDown();
+    for (const int file : {screen_, keyboard_}) {
+      if (file >= 0) close(file);
+    }
+  }
+
+  termios Settings() const {
+    termios settings{};
+    EXPECT_EQ(tcgetattr(screen_, &settings), 0);
+    return settings;
+  }
+  bool ShowsWhatIsTyped() const { return (Settings().c_lflag & ECHO) != 0; }
+  // How often the question was asked.
+  int Questions() const {
+    const std::string errors = Errors(), question = "Password of anna: ";
+    int count = 0;
+    for (std::size_t at = 0; (at = errors.find(question, at)) != std::string::npos; ++at) ++count;
+    return count;
+  }
+  bool IsStopped() const {
+    siginfo_t stopped{};
+    waitid(P_PID, static_cast<id_t>(child_), &stopped, WSTOPPED | WNOHANG | WNOWAIT);
+    return stopped.si_pid != 0;
+  }
+  void Type(const std::string& typed) const {
+    ASSERT_EQ(write(keyboard_, typed.data(), typed.size()), static_cast<ssize_t>(typed.size()));
+  }
+
+  int keyboard_ = -1, screen_ = -1;
+  termios before_{};
+};
+
+TEST_F(PasswordAtTerminal, CtrlCEndsTheQuestionAtOnce) {
+  Type("secret\x03");
   EXPECT_EQ(ExitStatus(), 1) << Errors();
   EXPECT_THAT(Errors(), EndsWith("docent: Interrupted; the user was not added.\n"));
-  ASSERT_EQ(tcgetattr(screen, &settings), 0);
-  EXPECT_NE(settings.c_lflag & ECHO, 0u);
-  EXPECT_NE(settings.c_lflag & ISIG, 0u);
-  close(screen);
-  close(keyboard);
+  EXPECT_TRUE(ShowsWhatIsTyped());
+  EXPECT_EQ(Settings().c_cc[VINTR], before_.c_cc[VINTR]);
+}
+
+TEST_F(PasswordAtTerminal, ASignalThatEndsTheProgramLeavesATerminalThatShowsWhatIsTyped) {
+  // The key Ctrl-\ sends its signal at once.
+  EXPECT_NE(Settings().c_lflag & ISIG, 0u);
+  kill(child_, SIGTERM);
+  EXPECT_EQ(ExitStatus(), 128 + SIGTERM) << Errors();
+  EXPECT_TRUE(ShowsWhatIsTyped());
+}
+
+TEST_F(PasswordAtTerminal, TheTerminalShowsWhatIsTypedWhileTheProgramIsStoppedAndTheQuestionIsAskedAnew) {
+  kill(child_, SIGTSTP);  // As by the key Ctrl-Z.
+  WaitUntil([this] { return IsStopped(); });
+  ASSERT_TRUE(IsStopped());
+  EXPECT_TRUE(ShowsWhatIsTyped());
+  kill(child_, SIGCONT);
+  WaitUntil([this] { return Questions() == 2; });
+  EXPECT_FALSE(ShowsWhatIsTyped());
+  Type("\x03");
+  EXPECT_EQ(ExitStatus(), 1) << Errors();
+  EXPECT_TRUE(ShowsWhatIsTyped());
 }
 
 }  // namespace

@@ -23,9 +23,11 @@ extern char** environ;
 namespace docent::app {
 
 // Starts the program with its standard output and errors in these files and the standard input from a file
-// or terminal; by default it is empty.
+// or terminal; by default it is empty. `can_stop`: in a process group of its own, so that SIGTSTP stops it
+// wherever the test runs: it stops no group whose parents are all in another session.
 inline pid_t StartDocent(std::vector<std::string> arguments, const std::string& output,
-                         const std::string& errors, const std::string& input = "/dev/null") {
+                         const std::string& errors, const std::string& input = "/dev/null",
+                         bool can_stop = false) {
   arguments.insert(arguments.begin(), DOCENT_BINARY_DIR "/docent");
   std::vector<char*> argv;
   for (std::string& argument : arguments) argv.push_back(argument.data());
@@ -35,8 +37,12 @@ inline pid_t StartDocent(std::vector<std::string> arguments, const std::string& 
   posix_spawn_file_actions_addopen(&actions, STDIN_FILENO, input.c_str(), O_RDONLY | O_NOCTTY, 0);
   posix_spawn_file_actions_addopen(&actions, STDOUT_FILENO, output.c_str(), O_WRONLY | O_CREAT, 0600);
   posix_spawn_file_actions_addopen(&actions, STDERR_FILENO, errors.c_str(), O_WRONLY | O_CREAT, 0600);
+  posix_spawnattr_t attributes;
+  posix_spawnattr_init(&attributes);
+  if (can_stop) posix_spawnattr_setflags(&attributes, POSIX_SPAWN_SETPGROUP);
   pid_t child = 0;
-  const int spawned = posix_spawn(&child, argv[0], &actions, nullptr, argv.data(), environ);
+  const int spawned = posix_spawn(&child, argv[0], &actions, &attributes, argv.data(), environ);
+  posix_spawnattr_destroy(&attributes);
   posix_spawn_file_actions_destroy(&actions);
   EXPECT_EQ(spawned, 0) << "cannot start " << argv[0];
   return child;
