@@ -72,14 +72,19 @@ void KeyFrameOffers::Consider(const CameraImage& image, const MapSnapshot& map, 
   Offer(choice, image, &map, result.camera_from_map, pose.matches, pose.panorama);
 }
 
-// A camera that moves so fast that its points leave the image cannot wait long: the next keyframe then
-// follows as soon as the map has the last one, without whose points it would be chosen as if that one did not
-// exist.
+// Until the map has the last keyframe, the next one would be chosen as if that one did not exist. A camera
+// that moves so fast that its points leave the image cannot wait longer than that.
 bool KeyFrameOffers::IsTooEarly(const MapSnapshot& map, int inliers) const {
-  if (frames_since_keyframe_ >= options_.frames_between_keyframes) return false;
-  return !accepted_ || inliers >= options_.min_kept_ratio * accepted_->inliers ||
-         std::none_of(map.keyframes.rbegin(), map.keyframes.rend(),
-                      [&](const KeyFrame& keyframe) { return keyframe.time == accepted_->time; });
+  const auto has_keyframe = [&](const auto& is_expected) {
+    return std::any_of(map.keyframes.rbegin(), map.keyframes.rend(), is_expected);
+  };
+  if (frames_since_keyframe_ < options_.frames_between_keyframes) {
+    return !accepted_ || inliers >= options_.min_kept_ratio * accepted_->inliers ||
+           !has_keyframe([&](const KeyFrame& keyframe) { return keyframe.time == accepted_->time; });
+  }
+  if (!accepted_ || frames_since_keyframe_ >= options_.max_frames_without_keyframe) return false;
+  // It may have been removed since as redundant.
+  return !has_keyframe([&](const KeyFrame& keyframe) { return keyframe.time >= accepted_->time; });
 }
 
 void KeyFrameOffers::Remember(const CameraImage& image, const MapSnapshot& map, const TrackedPose& pose) {

@@ -24,6 +24,7 @@ std::optional<std::string> TrackerOptions::Validate() const {
       .Positive(max_rotation_sigma, "sigma of a rotation")
       .AtLeast(max_poor_rotation_frames, 1, "number of frames with a poor rotation")
       .AtLeast(frames_between_keyframes, 0, "number of frames between keyframes")
+      .AtLeast(max_frames_without_keyframe, 0, "number of frames without an accepted keyframe")
       .Ratio(min_kept_ratio, "ratio of inliers kept since a keyframe")
       .AtLeast(min_relocalization_inliers, 1, "number of inliers after a loss")
       .Ratio(min_relocalization_quality, "inlier ratio after a loss")

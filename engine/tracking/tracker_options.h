@@ -67,6 +67,9 @@ struct TrackerOptions {
   int max_poor_rotation_frames = 5;
   // Lets the mapper's result for the last keyframe arrive in the map first.
   int frames_between_keyframes = 4;
+  // After so many, half a second at 30 Hz, a keyframe that the map does not have yet is no longer awaited:
+  // the mapper may have dropped it.
+  int max_frames_without_keyframe = 15;
   // A frame with fewer inliers than this ratio of the last keyframe's waits only until that one is in the
   // map. Measured on cameras that rush past shelves and desks: 0.9 keeps almost as many images as never
   // waiting, where slow cameras get up to 73 % more keyframes; 0.8 loses a third more of the images than 0.9.

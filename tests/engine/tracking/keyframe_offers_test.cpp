@@ -40,6 +40,13 @@ class SidewaysStep : public ::testing::Test {
     return last_.has_value();
   }
 
+  void AddToMap(Timestamp time) {
+    KeyFrame keyframe = map_.keyframes.back();
+    keyframe.id += 1;
+    keyframe.time = time;
+    map_.keyframes.push_back(keyframe);
+  }
+
   MapSnapshot map_;
   MapTrackResult result_;
   std::vector<PointMatch> matches_;
@@ -71,8 +78,29 @@ TEST_F(SidewaysStep, IsOfferedAgainInTheNextFrameWhenItWasRefused) {
   while (first < 10 && !Offers(&offers, false)) ++first;
   ASSERT_LT(first, 10);
   EXPECT_TRUE(Offers(&offers, true));
+  AddToMap(image_.time);
   for (int i = 1; i < options.frames_between_keyframes; ++i) EXPECT_FALSE(Offers(&offers, true)) << i;
   EXPECT_TRUE(Offers(&offers, true));
+}
+
+TEST_F(SidewaysStep, WaitsUntilTheLastKeyframeIsInTheMapUnlessItWasDropped) {
+  TrackerOptions options;
+  const auto frames_until_the_next = [&](int frames_until_in_map) {
+    const MapSnapshot map = map_;
+    KeyFrameOffers offers(options, *Camera());
+    int frames = 0;
+    while (frames < 10 && !Offers(&offers, true)) ++frames;
+    EXPECT_LT(frames, 10);
+    for (frames = 1; frames < 100; ++frames) {
+      if (frames == frames_until_in_map) AddToMap(image_.time);
+      if (Offers(&offers, true)) break;
+    }
+    map_ = map;
+    return frames;
+  };
+  EXPECT_EQ(frames_until_the_next(1), options.frames_between_keyframes);
+  EXPECT_EQ(frames_until_the_next(9), 9);
+  EXPECT_EQ(frames_until_the_next(100), options.max_frames_without_keyframe);
 }
 
 TEST_F(SidewaysStep, IsOfferedAsSoonAsTheLastKeyframeIsInTheMapWhenPointsLeaveTheImage) {
@@ -84,10 +112,7 @@ TEST_F(SidewaysStep, IsOfferedAsSoonAsTheLastKeyframeIsInTheMapWhenPointsLeaveTh
     int frames = 0;
     while (frames < 10 && !Offers(&offers, true)) ++frames;
     EXPECT_LT(frames, 10);
-    KeyFrame last = map_.keyframes.back();
-    last.id += 1;
-    last.time = image_.time;
-    if (in_map) map_.keyframes.push_back(last);
+    if (in_map) AddToMap(image_.time);
     result_.inliers = result_.finite_inliers = inliers;
     const bool offered = Offers(&offers, true);
     map_ = map;

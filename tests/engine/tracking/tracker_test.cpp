@@ -445,7 +445,8 @@ TEST(Tracker, OffersTheNextFrameAfterAKeyFrameWasRefusedAndWaitsAfterItWasAccept
   SomeMaps places;
   places.Add(9, walk.map);
   TrackerOptions options = WithoutPanoramas();
-  options.keyframes.min_distance = 1e-6;  // every frame is a new view
+  options.keyframes.min_distance = 1e-6;    // every frame is a new view
+  options.max_frames_without_keyframe = 0;  // the map stays as it is
   Tracker tracker(options, Camera(), 3);
   tracker.SetMap(walk.map, 9);
   std::vector<int> offered;
