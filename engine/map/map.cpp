@@ -307,6 +307,7 @@ std::shared_ptr<const MapSnapshot> Map::Snapshot() {
   std::erase_if(points_, [](const PointRecord& record) { return !record.alive; });
   auto snapshot = std::make_shared<MapSnapshot>();
   snapshot->revision = ++revision_;
+  snapshot->first_unadjusted = first_unadjusted_;
   snapshot->next_keyframe = next_keyframe_;
   snapshot->next_point = next_point_;
   snapshot->next_panorama = next_panorama_;

@@ -79,6 +79,9 @@ class Map {
   // By ascending revision.
   const std::vector<std::shared_ptr<const MapCorrection>>& corrections() const { return corrections_; }
 
+  // The first keyframe that waits for its local adjustment, for the next Snapshot(); kNoId if none does.
+  void SetFirstUnadjusted(KeyFrameId id) { first_unadjusted_ = id; }
+
   // Updates the median depth of the points that a keyframe observes, and the robust deviation from it.
   void UpdateDepth(KeyFrameRecord* record);
   // Sets the normal to the mean direction towards its observers.
@@ -104,6 +107,7 @@ class Map {
   MapPointId next_point_ = 0;
   PanoramaId next_panorama_ = 0;
   std::uint64_t revision_ = 0;
+  KeyFrameId first_unadjusted_ = kNoId;
 };
 
 }  // namespace docent::engine

@@ -51,7 +51,7 @@ std::optional<Eigen::Vector2d> ReadoutIn(const Map& map, const CameraModel& came
 double LargestRotationRateIn(const MapSnapshot& map, const CameraModel& camera) {
   double largest = 0;
   for (const KeyFrame& keyframe : map.keyframes) {
-    if (IsRotatingImage(*keyframe.camera, camera))
+    if (keyframe.id < map.first_unadjusted && IsRotatingImage(*keyframe.camera, camera))
       largest = std::max(largest, keyframe.camera->readout_motion().rotation_rate.norm());
   }
   return largest;

@@ -17,7 +17,7 @@ std::optional<Eigen::Vector2d> ReadoutIn(const MapSnapshot& map, const CameraMod
 std::optional<Eigen::Vector2d> ReadoutIn(const Map& map, const CameraModel& camera);
 
 // The largest rotation rate of the images of the camera's lens in a map, radians per second; zero if none is
-// known.
+// known. Without keyframes that wait for their local adjustment, which do not tell the readout time yet.
 double LargestRotationRateIn(const MapSnapshot& map, const CameraModel& camera);
 
 // The model of an image with the readout time that its lens has in a map: `camera` itself if the map has

@@ -90,6 +90,8 @@ struct MapSnapshot {
   std::vector<PanoramaMap> panoramas;     // by ascending id
   // The most recent corrections by ascending revision; not stored with the map.
   std::vector<std::shared_ptr<const MapCorrection>> corrections;
+  // The first keyframe that waits for its local adjustment; kNoId if none does. Not stored with the map.
+  KeyFrameId first_unadjusted = kNoId;
   // Next ids to assign, so that a map that is stored and later extended never reuses one.
   KeyFrameId next_keyframe = 0;
   MapPointId next_point = 0;     // the same for points

@@ -26,6 +26,7 @@ void MapRefinement::Forget() {
 
 void MapRefinement::AddKeyFrame(KeyFrameId keyframe) {
   to_adjust_.push_back(keyframe);
+  workspace_->map.SetFirstUnadjusted(FirstToAdjust());
   AddLocalized(keyframe);
 }
 
@@ -70,6 +71,7 @@ void MapRefinement::AdjustAroundNewest() {
     locally_adjusted_ = to_adjust_.empty();
     AdjustToReadout(keyframe);
   }
+    map.SetFirstUnadjusted(FirstToAdjust());
   output_->Publish(map.Snapshot());
 }
 

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <algorithm>
 #include <atomic>
 #include <cstddef>
 #include <memory>
@@ -83,6 +84,7 @@ class MapRefinement {
   KeyFrameId NewestToAdjust() const { return to_adjust_.empty() ? newest_ : to_adjust_.back(); }
   bool UpdateReadoutOf(KeyFrameId keyframe);
   // Estimates the readout time and adjusts the map around this keyframe again if it changed, which is
+  KeyFrameId FirstToAdjust() const { return to_adjust_.empty() ? kNoId : std::ranges::min(to_adjust_); }
   // returned.
   bool AdjustToReadout(KeyFrameId keyframe);
   const MapperOptions& options_;

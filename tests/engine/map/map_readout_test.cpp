@@ -56,6 +56,10 @@ TEST(MapReadout, KnowsTheLargestRotationRateOfACamera) {
   AddKeyFrame(Image(camera, 0.1, 0), &map);
   AddKeyFrame(Image(other, 2, 0), &map);
   EXPECT_DOUBLE_EQ(LargestRotationRateIn(*map.Snapshot(), *camera), 0.7);
+  map.SetFirstUnadjusted(AddKeyFrame(Image(camera, 0.9, 0), &map));
+  EXPECT_DOUBLE_EQ(LargestRotationRateIn(*map.Snapshot(), *camera), 0.7) << "the newest is not adjusted yet";
+  map.SetFirstUnadjusted(kNoId);
+  EXPECT_DOUBLE_EQ(LargestRotationRateIn(*map.Snapshot(), *camera), 0.9);
 }
 
 TEST(MapReadout, TurnsInfinitePointsToWhereTheyWereSeen) {
