@@ -79,6 +79,12 @@ class Map {
   // By ascending revision.
   const std::vector<std::shared_ptr<const MapCorrection>>& corrections() const { return corrections_; }
 
+  // To be called when keyframes and points were moved otherwise, as by an adjustment: poses that refer to an
+  // earlier snapshot no longer fit.
+  void NoteMovement() { moved_in_ = revision_ + 1; }
+  // The revision of the first snapshot after the last such movement; 0 if there was none.
+  std::uint64_t moved_in() const { return moved_in_; }
+
   // The first keyframe that waits for its local adjustment, for the next Snapshot(); kNoId if none does.
   void SetFirstUnadjusted(KeyFrameId id) { first_unadjusted_ = id; }
 
@@ -107,6 +113,7 @@ class Map {
   MapPointId next_point_ = 0;
   PanoramaId next_panorama_ = 0;
   std::uint64_t revision_ = 0;
+  std::uint64_t moved_in_ = 0;
   KeyFrameId first_unadjusted_ = kNoId;
 };
 

@@ -79,6 +79,7 @@ bool SetReadout(const CameraModel& camera, const Eigen::Vector2d& readout_s, Map
   for (Map::PointRecord& record : map->points()) {
     if (record.alive && record.point.infinite()) map->UpdateDirection(&record);
   }
+  map->NoteMovement();
   return true;
 }
 

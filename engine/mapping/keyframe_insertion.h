@@ -33,6 +33,9 @@ class KeyFrameInsertion {
   void ApplyReports(std::span<const PointReport> reports);
   // The candidate with the corrections applied that the map received since the pose was estimated.
   KeyFrameCandidate WithCorrections(KeyFrameCandidate candidate) const;
+  // The pose of a candidate in the present map, from its matches; that of the candidate if they do not
+  // determine it.
+  Rigid3 PoseInPresentMap(const KeyFrameCandidate& candidate);
   void InsertSixDof(const KeyFrameCandidate& candidate);
   // The keyframes in which the corners of this one are searched.
   std::vector<KeyFrameId> Partners(KeyFrameId keyframe);

@@ -79,6 +79,7 @@ BundleSummary Solve(const BundleOptions& options, MapAssembly* assembly, Map* ma
   }
   for (const KeyFrameId id : assembly->cameras) map->UpdateDepth(map->FindKeyFrame(id));
   registration.Follow(map);
+  map->NoteMovement();
   return summary;
 }
 

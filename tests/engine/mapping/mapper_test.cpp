@@ -199,6 +199,26 @@ TEST_F(MapperTest, ExtendsTheMapByKeyframesUntilIdle) {
   EXPECT_GT(mapper.Times().other, 0);
 }
 
+TEST_F(MapperTest, FindsThePoseOfAKeyframeAnewIfTheMapHasMovedSinceItWasTracked) {
+  const Rigid3 pose = CameraAt({0.45, 0, 0}), offered = CameraAt({0.48, 0.02, 0});
+  const auto error_of_newest = [&](bool is_old) {
+    Mapper mapper({});
+    mapper.Adopt(started_);
+    mapper.Offer(TrueCandidate(*world_, *started_, CameraAt({0.25, 0, 0}), 1));
+    WorkUntilIdle(&mapper);
+    KeyFrameCandidate candidate = TrueCandidate(*world_, *started_, pose, 2);
+    candidate.camera_from_map = offered;
+    candidate.map_revision = is_old ? started_->revision : mapper.Snapshot()->revision;
+    mapper.Offer(candidate);
+    mapper.Step();
+    const Rigid3& newest = mapper.Snapshot()->keyframes.back().camera_from_map;
+    return (newest.OriginInSource() - pose.OriginInSource()).norm();
+  };
+  EXPECT_LT(error_of_newest(true), 0.015);
+  EXPECT_NEAR(error_of_newest(false), (offered.OriginInSource() - pose.OriginInSource()).norm(), 1e-9)
+      << "the pose fits the present map";
+}
+
 // The first two views of a camera that turned meanwhile, with this readout time.
 InitialPair TurningPair(const InitialPair& views, double readout_s) {
   const auto camera = [&](double rate) {
