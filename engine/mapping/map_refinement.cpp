@@ -65,13 +65,14 @@ void MapRefinement::AdjustAroundNewest() {
   const KeyFrameId keyframe = NewestToAdjust();
   // The adjustment removes observations, on which the window depends.
   const std::set<KeyFrameId> adjusted = KeyFramesAround(options_.adjustment.window, keyframe, &map);
-  const BundleSummary summary = AdjustLocally(options_.adjustment, keyframe, interrupt_, &map);
+  const std::atomic<bool>* const interrupt = IsAdjustmentOverdue() ? nullptr : interrupt_;
+  const BundleSummary summary = AdjustLocally(options_.adjustment, keyframe, interrupt, &map);
   if (summary.outcome != BundleSummary::Outcome::kInterrupted) {
     std::erase_if(to_adjust_, [&](KeyFrameId waiting) { return adjusted.contains(waiting); });
     locally_adjusted_ = to_adjust_.empty();
     AdjustToReadout(keyframe);
-  }
     map.SetFirstUnadjusted(FirstToAdjust());
+  }
   output_->Publish(map.Snapshot());
 }
 

@@ -50,6 +50,9 @@ class MapRefinement {
 
   // True unless keyframes wait for their local adjustment. From any thread.
   bool IsLocallyAdjusted() const { return locally_adjusted_; }
+  // True once a second keyframe waits. Further ones have to wait then: in a fast motion one follows the
+  // other, and no adjustment would ever be completed.
+  bool IsAdjustmentOverdue() const { return to_adjust_.size() > 1; }
   bool HasNewPoints() const { return !to_match_.empty(); }
   bool NeedsGlobalAdjustment() const;
   bool MayHaveRedundantKeyFrames() const { return culling_due_; }
@@ -58,7 +61,7 @@ class MapRefinement {
   // adjustment, or with the newest one.
   void MatchNewPoints();
   // Adjusts the newest of the waiting keyframes and those around it. The others in this window wait no
-  // longer.
+  // longer. Not interrupted if it is overdue.
   void AdjustAroundNewest();
   // The readout time of a lens that was estimated from the corners of the initialization.
   void SetReadoutPrior(const std::optional<ReadoutPrior>& prior, std::shared_ptr<const CameraModel> lens);
@@ -81,10 +84,10 @@ class MapRefinement {
   // Whether the readout time may be estimated: the errors of a calibration that is not known yet look alike.
   bool MayEstimateReadout() const { return !options_.temporary && options_.lens.lenses.empty(); }
   std::vector<KnownReadout>::iterator FindKnownReadout(const CameraModel& lens);
+  KeyFrameId FirstToAdjust() const { return to_adjust_.empty() ? kNoId : std::ranges::min(to_adjust_); }
   KeyFrameId NewestToAdjust() const { return to_adjust_.empty() ? newest_ : to_adjust_.back(); }
   bool UpdateReadoutOf(KeyFrameId keyframe);
   // Estimates the readout time and adjusts the map around this keyframe again if it changed, which is
-  KeyFrameId FirstToAdjust() const { return to_adjust_.empty() ? kNoId : std::ranges::min(to_adjust_); }
   // returned.
   bool AdjustToReadout(KeyFrameId keyframe);
   const MapperOptions& options_;

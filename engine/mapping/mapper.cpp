@@ -98,7 +98,10 @@ MapJoinAttempt Mapper::Join(const MapSnapshot& other, const std::atomic<bool>* i
 bool Mapper::Step() {
   const double start = ProcessorSeconds();
   double MapperTimes::*account = &MapperTimes::other;
-  if (auto request = queue_.BeginStep()) {
+  if (refinement_.IsAdjustmentOverdue()) {
+    queue_.BeginOtherWork();
+    account = DoNextTask();
+  } else if (auto request = queue_.BeginStep()) {
     Serve(*std::move(request));
   } else {
     account = DoNextTask();

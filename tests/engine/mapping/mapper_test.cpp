@@ -219,6 +219,21 @@ TEST_F(MapperTest, FindsThePoseOfAKeyframeAnewIfTheMapHasMovedSinceItWasTracked)
       << "the pose fits the present map";
 }
 
+TEST_F(MapperTest, AdjustsTwoKeyframesBeforeItInsertsAThird) {
+  Mapper mapper({});
+  mapper.Adopt(started_);
+  for (int i = 0; i < 3; ++i)
+    ASSERT_TRUE(mapper.Offer(TrueCandidate(*world_, *started_, CameraAt({0.2 + 0.1 * i, 0, 0}), 1 + i)));
+  mapper.Step();
+  mapper.Step();
+  ASSERT_EQ(mapper.Snapshot()->keyframes.size(), started_->keyframes.size() + 2);
+  EXPECT_NE(mapper.Snapshot()->first_unadjusted, kNoId);
+  for (int step = 0; step < 10 && mapper.Snapshot()->first_unadjusted != kNoId; ++step) mapper.Step();
+  EXPECT_EQ(mapper.Snapshot()->keyframes.size(), started_->keyframes.size() + 2);
+  WorkUntilIdle(&mapper);
+  EXPECT_EQ(mapper.Snapshot()->keyframes.size(), started_->keyframes.size() + 3);
+}
+
 // The first two views of a camera that turned meanwhile, with this readout time.
 InitialPair TurningPair(const InitialPair& views, double readout_s) {
   const auto camera = [&](double rate) {
