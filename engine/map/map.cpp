@@ -22,7 +22,8 @@ Map::Map(const MapSnapshot& snapshot)
       next_keyframe_(snapshot.next_keyframe),
       next_point_(snapshot.next_point),
       next_panorama_(snapshot.next_panorama),
-      revision_(snapshot.revision) {
+      revision_(snapshot.revision),
+      moved_in_(snapshot.revision) {
   for (const KeyFrame& keyframe : snapshot.keyframes) keyframes_[keyframe.id].keyframe = keyframe;
   points_.reserve(snapshot.points.size());
   for (const MapPoint& point : snapshot.points) points_.push_back({.point = point, .observers = {}});

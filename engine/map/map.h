@@ -82,7 +82,7 @@ class Map {
   // To be called when keyframes and points were moved otherwise, as by an adjustment: poses that refer to an
   // earlier snapshot no longer fit.
   void NoteMovement() { moved_in_ = revision_ + 1; }
-  // The revision of the first snapshot after the last such movement; 0 if there was none.
+  // The revision of the first snapshot after the last such movement, or of the one it began as.
   std::uint64_t moved_in() const { return moved_in_; }
 
   // The first keyframe that waits for its local adjustment, for the next Snapshot(); kNoId if none does.

@@ -20,6 +20,7 @@ void MapRefinement::Reset() {
 
 void MapRefinement::Forget() {
   to_adjust_.clear();
+  workspace_->map.SetFirstUnadjusted(kNoId);
   to_match_.clear();
   keyframes_since_global_ = 0;
 }

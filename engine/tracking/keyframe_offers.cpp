@@ -83,8 +83,11 @@ bool KeyFrameOffers::IsTooEarly(const MapSnapshot& map, int inliers) const {
            !has_keyframe([&](const KeyFrame& keyframe) { return keyframe.time == accepted_->time; });
   }
   if (!accepted_ || frames_since_keyframe_ >= options_.max_frames_without_keyframe) return false;
-  // It may have been removed since as redundant.
-  return !has_keyframe([&](const KeyFrame& keyframe) { return keyframe.time >= accepted_->time; });
+  // It may have been removed since as redundant, and the times of a map from the library are of another
+  // clock.
+  return !has_keyframe([&](const KeyFrame& keyframe) {
+    return keyframe.id >= accepted_->first_new && keyframe.time >= accepted_->time;
+  });
 }
 
 void KeyFrameOffers::Remember(const CameraImage& image, const MapSnapshot& map, const TrackedPose& pose) {
@@ -120,6 +123,7 @@ void KeyFrameOffers::Offer(KeyFrameChoice choice, const CameraImage& image, cons
   candidate.choice = choice;
   candidate.panorama = panorama;
   candidate.time = image.time;
+  first_new_ = map ? map->next_keyframe : 0;
   if (map) {
     candidate.map_revision = map->revision;
     candidate.reference_keyframe = FindReferenceKeyFrame(*map, matches);
@@ -136,7 +140,7 @@ void KeyFrameOffers::Offer(KeyFrameChoice choice, const CameraImage& image, cons
 std::optional<KeyFrameCandidate> KeyFrameOffers::Take() {
   if (candidate_)
     taken_ = Taken{candidate_->choice, candidate_->time, static_cast<int>(candidate_->matches.size()),
-                   candidate_->camera};
+                   candidate_->camera, first_new_};
   return std::exchange(candidate_, std::nullopt);
 }
 

@@ -60,6 +60,7 @@ class KeyFrameOffers {
     Timestamp time{};
     int inliers = 0;
     std::shared_ptr<const CameraModel> camera;
+    KeyFrameId first_new = 0;  // keyframes that the map had before have lower ids
   };
   // The last frame that had a position, with what an offer needs.
   struct Localized {
@@ -78,6 +79,7 @@ class KeyFrameOffers {
   TrackerOptions options_;
   KeyFramePolicy policy_;
   std::optional<KeyFrameCandidate> candidate_;
+  KeyFrameId first_new_ = 0;    // see Taken; of the candidate
   std::optional<Taken> taken_;  // what the mapper may still accept
   int frames_since_keyframe_ = 0;
   std::optional<Taken> accepted_;  // the last keyframe that the mapper accepted for this map

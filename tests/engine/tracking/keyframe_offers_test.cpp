@@ -101,6 +101,10 @@ TEST_F(SidewaysStep, WaitsUntilTheLastKeyframeIsInTheMapUnlessItWasDropped) {
   EXPECT_EQ(frames_until_the_next(1), options.frames_between_keyframes);
   EXPECT_EQ(frames_until_the_next(9), 9);
   EXPECT_EQ(frames_until_the_next(100), options.max_frames_without_keyframe);
+  // A map from the library has times of another clock.
+  AddToMap(image_.time + FromSeconds(100));
+  map_.next_keyframe = map_.keyframes.back().id + 1;
+  EXPECT_EQ(frames_until_the_next(9), 9);
 }
 
 TEST_F(SidewaysStep, IsOfferedAsSoonAsTheLastKeyframeIsInTheMapWhenPointsLeaveTheImage) {
