@@ -117,8 +117,8 @@ class NoEcho {
 
 std::string AskedLine(const std::string& question, const NoEcho& hidden) {
   const std::string prompt = question + ": ";
+  g_prompt = &prompt;  // Before it is shown: a signal may come at once.
   if (hidden.is_terminal()) std::fputs(prompt.c_str(), stderr);
-  g_prompt = &prompt;
   std::string line;
   bool is_interrupted = false;
   for (int c = 0; !is_interrupted && (c = std::fgetc(stdin)) != EOF && c != '\n';) {

@@ -209,6 +209,7 @@ TEST_F(PasswordAtTerminal, TheTerminalShowsWhatIsTypedWhileTheProgramIsStoppedAn
   EXPECT_TRUE(ShowsWhatIsTyped());
   kill(child_, SIGCONT);
   WaitUntil([this] { return Questions() == 2; });
+  ASSERT_EQ(Questions(), 2) << Errors();
   EXPECT_FALSE(ShowsWhatIsTyped());
   Type("\x03");
   EXPECT_EQ(ExitStatus(), 1) << Errors();
