@@ -30,6 +30,7 @@ void KeyFrameOffers::SetCamera(const CameraModel& camera) {
 
 void KeyFrameOffers::Restart() {
   policy_.Reset();
+  awaits_accepted_ = false;
   localized_.image = {};
 }
 
@@ -82,7 +83,7 @@ bool KeyFrameOffers::IsTooEarly(const MapSnapshot& map, int inliers) const {
     return !accepted_ || inliers >= options_.min_kept_ratio * accepted_->inliers ||
            !has_keyframe([&](const KeyFrame& keyframe) { return keyframe.time == accepted_->time; });
   }
-  if (!accepted_ || frames_since_keyframe_ >= options_.max_frames_without_keyframe) return false;
+  if (!awaits_accepted_ || frames_since_keyframe_ >= options_.max_frames_without_keyframe) return false;
   // It may have been removed since as redundant, and the times of a map from the library are of another
   // clock.
   return !has_keyframe([&](const KeyFrame& keyframe) {
@@ -149,6 +150,7 @@ std::optional<Timestamp> KeyFrameOffers::Accept() {
   frames_since_keyframe_ = 0;
   policy_.Accepted(taken_->choice, taken_->time, taken_->camera);
   accepted_ = std::exchange(taken_, std::nullopt);
+  awaits_accepted_ = true;
   return accepted_->time;
 }
 

@@ -83,6 +83,7 @@ class KeyFrameOffers {
   std::optional<Taken> taken_;  // what the mapper may still accept
   int frames_since_keyframe_ = 0;
   std::optional<Taken> accepted_;  // the last keyframe that the mapper accepted for this map
+  bool awaits_accepted_ = false;   // it was accepted since the last Restart, so that this map is to get it
   Localized localized_;            // no image if there was none; its memory is used again
 };
 

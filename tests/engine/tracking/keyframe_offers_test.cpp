@@ -101,6 +101,13 @@ TEST_F(SidewaysStep, WaitsUntilTheLastKeyframeIsInTheMapUnlessItWasDropped) {
   EXPECT_EQ(frames_until_the_next(1), options.frames_between_keyframes);
   EXPECT_EQ(frames_until_the_next(9), 9);
   EXPECT_EQ(frames_until_the_next(100), options.max_frames_without_keyframe);
+  // The camera may be in another map after a restart.
+  KeyFrameOffers offers(options, *Camera());
+  int frames = 0;
+  while (frames < 10 && !Offers(&offers, true)) ++frames;
+  offers.Restart();
+  for (frames = 1; frames < 100 && !Offers(&offers, true);) ++frames;
+  EXPECT_EQ(frames, options.frames_between_keyframes);
   // A map from the library has times of another clock.
   AddToMap(image_.time + FromSeconds(100));
   map_.next_keyframe = map_.keyframes.back().id + 1;
