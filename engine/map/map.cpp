@@ -26,7 +26,11 @@ Map::Map(const MapSnapshot& snapshot)
       moved_in_(snapshot.revision) {
   for (const KeyFrame& keyframe : snapshot.keyframes) keyframes_[keyframe.id].keyframe = keyframe;
   points_.reserve(snapshot.points.size());
-  for (const MapPoint& point : snapshot.points) points_.push_back({.point = point, .observers = {}});
+  point_ids_.reserve(snapshot.points.size());
+  for (const MapPoint& point : snapshot.points) {
+    points_.push_back({.point = point, .observers = {}});
+    point_ids_.push_back(point.id);
+  }
   alive_points_ = points_.size();
   for (const Observation& observation : snapshot.observations) AddObservation(observation);
 }
@@ -41,15 +45,16 @@ Map::KeyFrameRecord& Map::AddKeyFrame(KeyFrame keyframe) {
 MapPointId Map::AddPoint(MapPoint point) {
   point.id = next_point_++;
   points_.push_back({.point = point, .observers = {}});
+  point_ids_.push_back(point.id);
   ++alive_points_;
   return point.id;
 }
 
 Map::PointRecord* Map::FindPoint(MapPointId id) {
-  const auto it =
-      std::lower_bound(points_.begin(), points_.end(), id,
-                       [](const PointRecord& record, MapPointId wanted) { return record.point.id < wanted; });
-  return it != points_.end() && it->point.id == id && it->alive ? &*it : nullptr;
+  const auto it = std::ranges::lower_bound(point_ids_, id);
+  if (it == point_ids_.end() || *it != id) return nullptr;
+  PointRecord& record = points_[static_cast<std::size_t>(it - point_ids_.begin())];
+  return record.alive ? &record : nullptr;
 }
 
 Map::KeyFrameRecord* Map::FindKeyFrame(KeyFrameId id) {
@@ -305,7 +310,10 @@ std::vector<std::pair<KeyFrameId, int>> Map::Covisible(KeyFrameId id) {
 }
 
 std::shared_ptr<const MapSnapshot> Map::Snapshot() {
-  std::erase_if(points_, [](const PointRecord& record) { return !record.alive; });
+  if (std::erase_if(points_, [](const PointRecord& record) { return !record.alive; }) > 0) {
+    point_ids_.clear();
+    for (const PointRecord& record : points_) point_ids_.push_back(record.point.id);
+  }
   auto snapshot = std::make_shared<MapSnapshot>();
   snapshot->revision = ++revision_;
   snapshot->first_unadjusted = first_unadjusted_;

@@ -106,6 +106,7 @@ class Map {
 
   std::map<KeyFrameId, KeyFrameRecord> keyframes_;
   std::vector<PointRecord> points_;
+  std::vector<MapPointId> point_ids_;  // of points_, so close together that a search stays in the cache
   std::vector<PanoramaMap> panoramas_;
   std::vector<std::shared_ptr<const MapCorrection>> corrections_;
   std::size_t alive_points_ = 0;

@@ -11,18 +11,6 @@
 
 namespace docent::engine {
 
-namespace {
-
-std::ptrdiff_t FinitePointsOf(KeyFrameId keyframe, Map* map) {
-  return std::ranges::count_if(map->FindKeyFrame(keyframe)->observations,
-                               [map](const Observation& observation) {
-                                 const Map::PointRecord* point = map->FindPoint(observation.point);
-                                 return point && !point->point.infinite();
-                               });
-}
-
-}  // namespace
-
 std::optional<std::string> LoopCandidateSearchOptions::Validate() const {
   return OptionCheck()
       .Ratio(min_covisibility_ratio, "covisibility of a neighbourhood")
@@ -38,28 +26,43 @@ std::optional<std::string> LoopCandidateSearchOptions::Validate() const {
       .fault();
 }
 
-std::set<KeyFrameId> Neighbourhood(KeyFrameId keyframe, double min_covisibility_ratio, int hops, Map* map) {
-  std::set<KeyFrameId> known = {keyframe};
-  for (int hop = 0; hop < hops; ++hop) {
-    std::vector<MapPointId> points;
-    for (const KeyFrameId id : known) {
-      for (const Observation& observation : map->FindKeyFrame(id)->observations)
-        points.push_back(observation.point);
-    }
-    std::sort(points.begin(), points.end());
-    points.erase(std::unique(points.begin(), points.end()), points.end());
-    std::map<KeyFrameId, std::size_t> shared;
-    for (const MapPointId id : points) {
-      const Map::PointRecord* point = map->FindPoint(id);
-      if (!point || point->point.infinite()) continue;
-      for (const KeyFrameId observer : point->observers) ++shared[observer];
-    }
-    for (const auto& [id, count] : shared) {
-      const auto all = static_cast<double>(FinitePointsOf(id, map));
-      if (static_cast<double>(count) >= min_covisibility_ratio * all) known.insert(id);
-    }
+const std::set<KeyFrameId>& Neighbourhoods::Of(KeyFrameId keyframe, int hops) {
+  const auto [entry, is_new] = known_.try_emplace({keyframe, hops});
+  if (!is_new) return entry->second;
+  entry->second.insert(keyframe);
+  for (int hop = 0; hop < hops; ++hop) AddStep(&entry->second);
+  return entry->second;
+}
+
+void Neighbourhoods::AddStep(std::set<KeyFrameId>* known) {
+  std::vector<MapPointId> points;
+  for (const KeyFrameId id : *known) {
+    for (const Observation& observation : map_.FindKeyFrame(id)->observations)
+      points.push_back(observation.point);
   }
-  return known;
+  std::sort(points.begin(), points.end());
+  points.erase(std::unique(points.begin(), points.end()), points.end());
+  std::map<KeyFrameId, std::size_t> shared;
+  for (const MapPointId id : points) {
+    const Map::PointRecord* point = map_.FindPoint(id);
+    if (!point || point->point.infinite()) continue;
+    for (const KeyFrameId observer : point->observers) ++shared[observer];
+  }
+  for (const auto& [id, count] : shared) {
+    const auto all = static_cast<double>(FinitePointsOf(id));
+    if (static_cast<double>(count) >= min_covisibility_ratio_ * all) known->insert(id);
+  }
+}
+
+std::ptrdiff_t Neighbourhoods::FinitePointsOf(KeyFrameId keyframe) {
+  const auto [entry, is_new] = finite_points_.try_emplace(keyframe);
+  if (!is_new) return entry->second;
+  entry->second = std::ranges::count_if(map_.FindKeyFrame(keyframe)->observations,
+                                        [this](const Observation& observation) {
+                                          const Map::PointRecord* point = map_.FindPoint(observation.point);
+                                          return point && !point->point.infinite();
+                                        });
+  return entry->second;
 }
 
 double SimilarityMagnitude::largest() const {
@@ -78,15 +81,16 @@ Sim3 KnownFromRecent(const LoopCandidate& candidate, Map* map) {
   return (candidate.keyframe_from_place * place).inverse() * keyframe;
 }
 
-void LoopCandidateSearch::Find(KeyFrameId id, const std::set<KeyFrameId>& here, Map* map,
-                               PointSearcher* searcher, const Take& take) {
+void LoopCandidateSearch::Find(KeyFrameId id, const std::set<KeyFrameId>& here,
+                               Neighbourhoods* neighbourhoods, PointSearcher* searcher, const Take& take) {
+  Map* const map = &neighbourhoods->map();
   const KeyFrame& keyframe = map->FindKeyFrame(id)->keyframe;
   AbsolutePoseOptions pose_options;
   pose_options.pixel_angle = keyframe.camera->PixelAngle();
   pose_options.inlier_px = options_.inlier_px;
   pose_options.min_inliers = options_.min_pose_inliers;
   pose_options.seed = id + 1;
-  for (const PlaceMatches& place : Compare(id, here, map)) {
+  for (const PlaceMatches& place : Compare(id, here, neighbourhoods)) {
     std::vector<Eigen::Vector3d> rays, points;
     for (const Match& match : place.matches) {
       const Map::PointRecord* point = map->FindPoint(match.point);
@@ -106,15 +110,16 @@ void LoopCandidateSearch::Find(KeyFrameId id, const std::set<KeyFrameId>& here, 
 // The places with most descriptor matches with the keyframe, best first.
 std::vector<LoopCandidateSearch::PlaceMatches> LoopCandidateSearch::Compare(KeyFrameId id,
                                                                             const std::set<KeyFrameId>& here,
-                                                                            Map* map) {
+                                                                            Neighbourhoods* neighbourhoods) {
+  Map* const map = &neighbourhoods->map();
   std::erase_if(described_, [&](const auto& entry) { return !map->FindKeyFrame(entry.first); });
   Describe(id, map);
   std::vector<PlaceMatches> places;
   std::size_t new_descriptions = 0;
-  for (const KeyFrameId best : RankByThumbnail(map->FindKeyFrame(id)->keyframe, here, map)) {
+  for (const KeyFrameId best : RankByThumbnail(map->FindKeyFrame(id)->keyframe, here, neighbourhoods)) {
     PlaceMatches place;
     place.group = {best};
-    const std::set<KeyFrameId> about = Neighbourhood(best, options_.min_covisibility_ratio, 1, map);
+    const std::set<KeyFrameId>& about = neighbourhoods->Of(best, 1);
     for (const auto& [other, shared] : map->Covisible(best)) {
       if (place.group.size() >= options_.max_group) break;
       if (about.contains(other) && !here.contains(other)) place.group.push_back(other);
@@ -136,9 +141,10 @@ std::vector<LoopCandidateSearch::PlaceMatches> LoopCandidateSearch::Compare(KeyF
 
 // Keyframes of different places outside `here`, the most similar thumbnail first.
 std::vector<KeyFrameId> LoopCandidateSearch::RankByThumbnail(const KeyFrame& keyframe,
-                                                             const std::set<KeyFrameId>& here, Map* map) {
+                                                             const std::set<KeyFrameId>& here,
+                                                             Neighbourhoods* neighbourhoods) {
   std::vector<std::pair<double, KeyFrameId>> ranked;
-  for (const auto& [id, record] : map->keyframes()) {
+  for (const auto& [id, record] : neighbourhoods->map().keyframes()) {
     if (record.keyframe.kind != KeyFrameKind::kSixDof || here.contains(id)) continue;
     const double difference =
         Difference(keyframe.features->small_blurry, record.keyframe.features->small_blurry);
@@ -151,7 +157,8 @@ std::vector<KeyFrameId> LoopCandidateSearch::RankByThumbnail(const KeyFrame& key
     if (places.size() >= options_.max_places) break;
     if (covered.contains(id)) continue;
     places.push_back(id);
-    covered.merge(Neighbourhood(id, options_.min_covisibility_ratio, 1, map));
+    const std::set<KeyFrameId>& about = neighbourhoods->Of(id, 1);
+    covered.insert(about.begin(), about.end());
   }
   return places;
 }

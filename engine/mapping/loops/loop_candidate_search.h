@@ -7,6 +7,7 @@
 #include <optional>
 #include <set>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "engine/base/option_check.h"
@@ -43,9 +44,27 @@ struct LoopCandidateSearchOptions {
   std::optional<std::string> Validate() const;
 };
 
-// The keyframe, the keyframes that share at least the ratio min_covisibility_ratio of their finite points
-// with it, and those that share as much with these, and so on for `hops` steps.
-std::set<KeyFrameId> Neighbourhood(KeyFrameId keyframe, double min_covisibility_ratio, int hops, Map* map);
+// The neighbourhoods of keyframes: the keyframe, the keyframes that share at least the ratio
+// min_covisibility_ratio of their finite points with it, those that share as much with these, and so on for
+// `hops` steps. Each is computed once, so that the map must not change.
+class Neighbourhoods {
+ public:
+  Neighbourhoods(double min_covisibility_ratio, Map* map)
+      : min_covisibility_ratio_(min_covisibility_ratio), map_(*map) {}
+
+  // The reference stays valid.
+  const std::set<KeyFrameId>& Of(KeyFrameId keyframe, int hops);
+  Map& map() const { return map_; }
+
+ private:
+  void AddStep(std::set<KeyFrameId>* known);
+  std::ptrdiff_t FinitePointsOf(KeyFrameId keyframe);
+
+  const double min_covisibility_ratio_;
+  Map& map_;
+  std::map<std::pair<KeyFrameId, int>, std::set<KeyFrameId>> known_;
+  std::map<KeyFrameId, std::ptrdiff_t> finite_points_;
+};
 
 // How far a similarity moves a camera: the displacement of its centre as a ratio of the keyframe's median
 // depth, the rotation in radians, and the absolute logarithm of the scale.
@@ -67,9 +86,10 @@ class LoopCandidateSearch {
   void Clear() { described_.clear(); }
   // Passes each verified candidate of a localized keyframe to `take`, the place with most matches first,
   // until `take` returns true. here: keyframes that are not considered, the keyframe itself among them.
+  // neighbourhoods: of the map in its present state.
   using Take = std::function<bool(LoopCandidate candidate)>;
-  void Find(KeyFrameId keyframe, const std::set<KeyFrameId>& here, Map* map, PointSearcher* searcher,
-            const Take& take);
+  void Find(KeyFrameId keyframe, const std::set<KeyFrameId>& here, Neighbourhoods* neighbourhoods,
+            PointSearcher* searcher, const Take& take);
 
  private:
   // The descriptor of a point in a keyframe on one level.
@@ -84,13 +104,14 @@ class LoopCandidateSearch {
     MapPointId point;       // of the known place
   };
   std::vector<KeyFrameId> RankByThumbnail(const KeyFrame& keyframe, const std::set<KeyFrameId>& here,
-                                          Map* map);
+                                          Neighbourhoods* neighbourhoods);
   // A place that resembles the keyframe.
   struct PlaceMatches {
     std::vector<KeyFrameId> group;  // keyframes of the place, the one most similar to the keyframe first
     std::vector<Match> matches;
   };
-  std::vector<PlaceMatches> Compare(KeyFrameId keyframe, const std::set<KeyFrameId>& here, Map* map);
+  std::vector<PlaceMatches> Compare(KeyFrameId keyframe, const std::set<KeyFrameId>& here,
+                                    Neighbourhoods* neighbourhoods);
   void Describe(KeyFrameId keyframe, Map* map);
   void AddMatches(const std::vector<Described>& own, const std::vector<Described>& known,
                   std::vector<Match>* matches) const;

@@ -52,7 +52,8 @@ std::vector<LoopCandidate> LoopDetector::Detect(KeyFrameId id, Map* map, PointSe
 std::optional<LoopCandidate> LoopDetector::FindCandidate(KeyFrameId id, Map* map, PointSearcher* searcher) {
   const LoopCandidateSearchOptions& search = options_.search;
   std::optional<LoopCandidate> plausible;
-  search_.Find(id, Neighbourhood(id, search.min_covisibility_ratio, search.hops, map), map, searcher,
+  Neighbourhoods neighbourhoods(search.min_covisibility_ratio, map);
+  search_.Find(id, neighbourhoods.Of(id, search.hops), &neighbourhoods, searcher,
                [&](LoopCandidate candidate) {
                  if (!IsPlausible(candidate, map)) return false;
                  plausible = std::move(candidate);

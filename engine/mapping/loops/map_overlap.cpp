@@ -127,9 +127,10 @@ void OverlapFinder::RecognizeKeyFrames(MapOverlap* overlap) {
   for (const auto& [id, record] : map_->keyframes()) {
     if (!keyframes_.IsOfA(id)) all_of_b.insert(id);
   }
+  Neighbourhoods neighbourhoods(options_.search.min_covisibility_ratio, map_);
   for (std::size_t order = 0; order < keyframes_.in_b.size() && !Interrupted(); ++order) {
     const std::size_t before = recognitions_.size();
-    search_.Find(keyframes_.in_b[order], all_of_b, map_, &searcher_, [&](LoopCandidate candidate) {
+    search_.Find(keyframes_.in_b[order], all_of_b, &neighbourhoods, &searcher_, [&](LoopCandidate candidate) {
       const Sim3 a_from_b = KnownFromRecent(candidate, map_);
       recognitions_.push_back({order, std::move(candidate), a_from_b});
       return false;

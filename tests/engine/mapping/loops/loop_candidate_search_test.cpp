@@ -48,19 +48,19 @@ Map ChainOfFive() {
 
 TEST(LoopNeighbourhood, GrowsByOneLinkWithEachHop) {
   Map map = ChainOfFive();
-  EXPECT_EQ(Neighbourhood(0, 0.2, 0, &map), (IdSet{0}));
-  EXPECT_EQ(Neighbourhood(0, 0.2, 1, &map), (IdSet{0, 1}));
-  EXPECT_EQ(Neighbourhood(0, 0.2, 2, &map), (IdSet{0, 1, 2}));
-  EXPECT_EQ(Neighbourhood(2, 0.2, 1, &map), (IdSet{1, 2, 3}));
-  EXPECT_EQ(Neighbourhood(0, 0.2, 9, &map), (IdSet{0, 1, 2, 3, 4}));
+  EXPECT_EQ(Neighbourhoods(0.2, &map).Of(0, 0), (IdSet{0}));
+  EXPECT_EQ(Neighbourhoods(0.2, &map).Of(0, 1), (IdSet{0, 1}));
+  EXPECT_EQ(Neighbourhoods(0.2, &map).Of(0, 2), (IdSet{0, 1, 2}));
+  EXPECT_EQ(Neighbourhoods(0.2, &map).Of(2, 1), (IdSet{1, 2, 3}));
+  EXPECT_EQ(Neighbourhoods(0.2, &map).Of(0, 9), (IdSet{0, 1, 2, 3, 4}));
 }
 
 TEST(LoopNeighbourhood, RequiresTheRatioOfTheOtherKeyframesPoints) {
   Map map = ChainOfFive();
   // Keyframe 1 shares 40 of its 80 points with keyframe 0, which shares all of its 40.
-  EXPECT_EQ(Neighbourhood(0, 0.5, 1, &map), (IdSet{0, 1}));
-  EXPECT_EQ(Neighbourhood(0, 0.51, 1, &map), (IdSet{0}));
-  EXPECT_EQ(Neighbourhood(1, 0.51, 1, &map), (IdSet{0, 1}));
+  EXPECT_EQ(Neighbourhoods(0.5, &map).Of(0, 1), (IdSet{0, 1}));
+  EXPECT_EQ(Neighbourhoods(0.51, &map).Of(0, 1), (IdSet{0}));
+  EXPECT_EQ(Neighbourhoods(0.51, &map).Of(1, 1), (IdSet{0, 1}));
 }
 
 TEST(LoopNeighbourhood, CountsThePointsSharedWithAnyOfItsKeyframes) {
@@ -70,15 +70,15 @@ TEST(LoopNeighbourhood, CountsThePointsSharedWithAnyOfItsKeyframes) {
   Share(15, {0, 2}, &map);
   Share(15, {1, 2}, &map);
   Share(70, {2}, &map);
-  EXPECT_EQ(Neighbourhood(0, 0.2, 1, &map), (IdSet{0, 1})) << "15 of 100 points are too few";
-  EXPECT_EQ(Neighbourhood(0, 0.2, 2, &map), (IdSet{0, 1, 2})) << "30 of 100 are shared with the two";
+  EXPECT_EQ(Neighbourhoods(0.2, &map).Of(0, 1), (IdSet{0, 1})) << "15 of 100 points are too few";
+  EXPECT_EQ(Neighbourhoods(0.2, &map).Of(0, 2), (IdSet{0, 1, 2})) << "30 of 100 are shared with the two";
 }
 
 TEST(LoopNeighbourhood, IgnoresInfinitePoints) {
   Map map = ChainOfFive();
   for (Map::PointRecord& record : map.points())
     if (record.observers == std::vector<KeyFrameId>{1, 2}) record.point.point_in_map = {0, 0, 1, 0};
-  EXPECT_EQ(Neighbourhood(0, 0.2, 9, &map), (IdSet{0, 1}));
+  EXPECT_EQ(Neighbourhoods(0.2, &map).Of(0, 9), (IdSet{0, 1}));
 }
 
 // The reference of a panorama map has many of them.
@@ -89,7 +89,7 @@ TEST(LoopNeighbourhood, RequiresNoRatioOfInfinitePoints) {
   Share(300, {1}, &map);
   for (Map::PointRecord& record : map.points())
     if (record.observers == std::vector<KeyFrameId>{1}) record.point.point_in_map = {0, 0, 1, 0};
-  EXPECT_EQ(Neighbourhood(0, 0.2, 1, &map), (IdSet{0, 1}));
+  EXPECT_EQ(Neighbourhoods(0.2, &map).Of(0, 1), (IdSet{0, 1}));
 }
 
 TEST(LoopSimilarityMagnitude, IsRelativeToTheDepthAndTakesPlaceAtTheCamera) {
