@@ -1,24 +1,16 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "engine/mapping/mapper.h"
 
-#include <time.h>
-
 #include <algorithm>
 #include <optional>
 #include <variant>
 
 #include "engine/base/option_check.h"
+#include "engine/base/processor_time.h"
 
 namespace docent::engine {
 
 namespace {
-
-// CPU time of this thread, so that other processes do not distort it.
-double ProcessorSeconds() {
-  timespec now{};
-  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);
-  return static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
-}
 
 // Moves the images of a request to the store (may be null).
 void StoreImages(ImageStore* store, MapperQueue::Request* request) {
@@ -91,6 +83,19 @@ MapJoinAttempt Mapper::Join(const MapSnapshot& other, const std::atomic<bool>* i
   MapJoinAttempt attempt = JoinMaps(options_.joining, *workspace_.map.Snapshot(), other, interrupt);
   if (attempt.joined) ResumeFrom(attempt.joined->map.get());
   output_.AddTime(&MapperTimes::other, ProcessorSeconds() - start, queue_.EndWork());
+  if (attempt.joined) output_.Publish(attempt.joined->map);
+  return attempt;
+}
+
+MapJoinAttempt Mapper::Join(const MapComparison& comparison, const std::atomic<bool>* interrupt) {
+  const double start = ProcessorSeconds();
+  queue_.BeginOtherWork();
+  MapJoinAttempt attempt = JoinCompared(options_.joining, comparison, *workspace_.map.Snapshot(), interrupt);
+  if (attempt.joined) {
+    ResumeFrom(attempt.joined->map.get());
+    refinement_.RequireAdjustmentOfLoop();
+  }
+  output_.AddTime(&MapperTimes::other, ProcessorSeconds() - start + comparison.seconds, queue_.EndWork());
   if (attempt.joined) output_.Publish(attempt.joined->map);
   return attempt;
 }

@@ -30,6 +30,13 @@ class Mapper {
   // ids and coordinates, and the queue remains. Nothing changes if the result has no `joined` map. Takes
   // seconds; must not be called during a Step(). interrupt may be null.
   MapJoinAttempt Join(const MapSnapshot& other, const std::atomic<bool>* interrupt);
+  // The same once the other map has been compared with this one, in a state from which the comparison still
+  // applies. It takes a second at most for a large map, because the adjustment is left to later steps, which
+  // a keyframe interrupts.
+  bool StillApplies(const MapComparison& comparison) const {
+    return engine::StillApplies(options_.joining, comparison, *Snapshot());
+  }
+  MapJoinAttempt Join(const MapComparison& comparison, const std::atomic<bool>* interrupt);
 
   // They return false if the queue is full. The times of the keyframes of one map ascend.
   bool Offer(KeyFrameCandidate candidate) { return queue_.Offer(std::move(candidate)); }

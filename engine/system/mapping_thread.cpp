@@ -11,7 +11,13 @@
 namespace docent::engine {
 
 MappingThread::MappingThread(const MapperOptions& options, bool threaded, UpdateCallback on_update)
-    : mapper_(options), on_update_(std::move(on_update)) {
+    : mapper_(options), on_update_(std::move(on_update)), comparer_(options.joining.overlap, [this] {
+        {
+          const std::scoped_lock lock(mutex_);
+          compared_ = has_work_ = true;
+        }
+        changed_.notify_all();
+      }) {
   if (!threaded) return;
   worker_.emplace("mapper", [this](const std::stop_token& stop) {
     LowerThreadPriority();
@@ -54,6 +60,8 @@ std::uint64_t MappingThread::Adopt(std::uint64_t key, std::shared_ptr<const MapS
     pair_.reset();
     join_.reset();
     interrupt_join_ = true;
+    comparer_.Cancel();
+    comparing_ = compared_ = false;
     starting_ = false;
     has_work_ = true;
     mapper_.Interrupt();
@@ -139,11 +147,45 @@ void MappingThread::JoinIfRequested() {
     request = std::exchange(join_, std::nullopt);
     interrupt_join_ = false;
   }
+  ReportJoin(request->number, mapper_.Join(*request->other, &interrupt_join_));
+}
+
+void MappingThread::CompareIfRequested() {
+  const std::scoped_lock lock(mutex_);
+  if (adoption_ || !join_) return;
+  Compare(join_->number, std::move(join_->other));
+  join_.reset();
+}
+
+// With mutex_ held.
+void MappingThread::Compare(std::uint64_t number, std::shared_ptr<const MapSnapshot> other) {
+  comparer_.Start(number, mapper_.Snapshot(), std::move(other));
+  comparing_ = true;
+  compared_ = false;
+}
+
+void MappingThread::JoinIfCompared() {
+  std::optional<MapComparer::Result> result;
+  {
+    const std::scoped_lock lock(mutex_);
+    if (adoption_ || !compared_) return;
+    comparing_ = compared_ = false;
+    result = comparer_.Take();
+    if (!result) return;
+    if (!mapper_.StillApplies(result->comparison)) {
+      Compare(result->number, std::move(result->comparison.b));
+      return;
+    }
+    interrupt_join_ = false;
+  }
+  ReportJoin(result->number, mapper_.Join(result->comparison, &interrupt_join_));
+}
+
+void MappingThread::ReportJoin(std::uint64_t number, MapJoinAttempt attempt) {
   MapperUpdate update;
   update.key = key_;
   update.adoption = adoption_number_;
-  update.join = MapperUpdate::Join{request->number, mapper_.Join(*request->other, &interrupt_join_)};
-  request.reset();
+  update.join = MapperUpdate::Join{number, std::move(attempt)};
   if (update.join->attempt.joined) update.snapshot = last_snapshot_ = mapper_.Snapshot();
   on_update_(update);
 }
@@ -189,14 +231,15 @@ void MappingThread::Run(const std::stop_token& stop) {
       idle_ = has_work_ = false;
     }
     ApplyAdoption();
-    JoinIfRequested();
+    CompareIfRequested();
+    JoinIfCompared();
     bool more = true;
     while (more && !stop.stop_requested()) {
       more = StepOnce();
       {
         const std::scoped_lock lock(mutex_);
         // has_work_ is set as well, so the outer loop continues with them.
-        if (adoption_ || pair_ || join_) more = false;
+        if (adoption_ || pair_ || join_ || compared_) more = false;
       }
       changed_.notify_all();
     }
@@ -209,13 +252,13 @@ bool MappingThread::IsBehind() const {
 
 bool MappingThread::IsIdle() const {
   const std::scoped_lock lock(mutex_);
-  return idle_ && !has_work_;
+  return HasNothingToDo();
 }
 
 void MappingThread::WaitUntilIdle(std::chrono::steady_clock::time_point latest, const std::stop_token& stop) {
   if (!worker_) return;
   std::unique_lock lock(mutex_);
-  changed_.wait_until(lock, stop, latest, [this] { return failed_ || (idle_ && !has_work_); });
+  changed_.wait_until(lock, stop, latest, [this] { return failed_ || HasNothingToDo(); });
   changed_.wait(lock, stop, [this] { return failed_ || !IsBehind(); });
 }
 
@@ -228,6 +271,8 @@ void MappingThread::Finish() {
     const std::scoped_lock lock(mutex_);
     join_.reset();
     interrupt_join_ = true;
+    comparer_.Cancel();
+    comparing_ = compared_ = false;
   }
   if (threaded) {
     worker_->RequestStop();

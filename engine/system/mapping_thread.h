@@ -15,6 +15,7 @@
 
 #include "engine/base/worker.h"
 #include "engine/mapping/mapper.h"
+#include "engine/system/map_comparer.h"
 
 namespace docent::engine {
 
@@ -53,7 +54,8 @@ class MappingThread {
   // Initializes the map of `key` from its first two views; false when another map was adopted since. The pair
   // waits while the queue of keyframes is full.
   bool Start(std::uint64_t key, InitialPair pair);
-  // Joins another map into the map of `key` (see Mapper::Join). Ignored when a map, even the same one, is
+  // Joins another map into the map of `key` (see Mapper::Join). Unless in lockstep, the maps are compared on
+  // a thread of their own, while the mapper extends its map. Ignored when a map, even the same one, is
   // adopted before it is done; then no update reports it. A newer request replaces a pending one.
   void Join(std::uint64_t key, std::uint64_t number, std::shared_ptr<const MapSnapshot> other);
   // Returns false when the mapper is busy, works on another map or has failed.
@@ -63,7 +65,7 @@ class MappingThread {
 
   // Lockstep only: runs steps until no urgent work is left (at most kMaxSteps), then one step of idle work.
   void RunLockstep();
-  // Threaded only: every request was served.
+  // Threaded only: every request was served, and no maps are being compared.
   bool IsIdle() const;
   // Threaded only: waits while the mapper works, at most until `latest`, and beyond it while the mapper is a
   // whole keyframe behind or initializes a map.
@@ -91,6 +93,11 @@ class MappingThread {
   void ReportFailure();
   void ApplyAdoption();    // serves a pending adoption and start
   void JoinIfRequested();  // after ApplyAdoption
+  void CompareIfRequested();
+  void JoinIfCompared();
+  void Compare(std::uint64_t number, std::shared_ptr<const MapSnapshot> other);
+  void ReportJoin(std::uint64_t number, MapJoinAttempt attempt);
+  bool HasNothingToDo() const { return idle_ && !has_work_ && !comparing_; }  // with mutex_ held
   bool StepOnce();
   bool IsBehind() const;  // with mutex_ held
 
@@ -109,10 +116,13 @@ class MappingThread {
   std::optional<InitialPair> pair_;
   std::optional<JoinRequest> join_;
   std::atomic<bool> interrupt_join_{false};  // read without the lock by the join that it interrupts
+  bool comparing_ = false;                   // two maps are being compared, or the result was not used yet
+  bool compared_ = false;                    // the result is there
   bool starting_ = false;                    // from Start until its map or its failure was reported
   bool has_work_ = false;                    // a request came since the last idle step
   bool idle_ = false;                        // the thread waits for work
   bool failed_ = false;                      // the thread ended with an exception, which Finish rethrows
+  MapComparer comparer_;                     // it uses the members above
   std::optional<Worker> worker_;             // last: it uses the other members
 };
 

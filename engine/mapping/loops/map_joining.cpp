@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "engine/base/option_check.h"
+#include "engine/base/processor_time.h"
 #include "engine/map/map_readout.h"
 #include "engine/mapping/bundle/map_adjustment.h"
 
@@ -118,6 +119,78 @@ bool HaveTooManyIds(const MapSnapshot& a, const MapSnapshot& b) {
          full(a.next_panorama, b.next_panorama);
 }
 
+// Whether a joined map may exist; otherwise the attempt says why not.
+bool MayBeJoined(const MapSnapshot& a, const MapSnapshot& b, MapJoinAttempt* attempt) {
+  if (HaveTooManyIds(a, b)) attempt->refusal = JoinRefusal::kTooManyIds;
+  return attempt->refusal == JoinRefusal::kNone;
+}
+
+// Joins both maps in one according to attempt->overlap, but for the adjustment. Null if they cannot be
+// joined; then the attempt says why.
+std::shared_ptr<JoinedMap> Unite(const MapJoiningOptions& options, const JoinedIds& ids,
+                                 const std::atomic<bool>* interrupt, MapJoinAttempt* attempt, Map* map) {
+  if (attempt->overlap.outcome != MapOverlap::Outcome::kOverlap) {
+    attempt->refusal = JoinRefusal::kNoOverlap;
+    return nullptr;
+  }
+  auto joined = std::make_shared<JoinedMap>();
+  joined->ids = ids;
+  joined->a_from_b = attempt->overlap.a_from_b;
+  std::vector<LoopCandidate> candidates = attempt->overlap.candidates;
+  MoveB(joined->a_from_b, ids.first_keyframe, map);
+  Rescale(joined->a_from_b, ids.first_keyframe, &candidates);
+  joined->aligned = map->Snapshot();
+  if (!SpreadDrift(options.correction, candidates, map)) {
+    attempt->refusal = JoinRefusal::kTooMuchDrift;
+    return nullptr;
+  }
+  KeepIdsOfA(ids.first_point, &candidates);
+  joined->points_merged = FuseDuplicatePoints(ids, candidates, interrupt, map);
+  return joined;
+}
+
+void Complete(std::shared_ptr<JoinedMap> joined, const std::atomic<bool>* interrupt, MapJoinAttempt* attempt,
+              Map* map) {
+  if (interrupt && *interrupt) {
+    attempt->refusal = JoinRefusal::kInterrupted;
+    return;
+  }
+  joined->map = map->Snapshot();
+  attempt->joined = std::move(joined);
+}
+
+JoinedIds IdsAfter(const MapSnapshot& a) {
+  return {a.next_keyframe, a.next_point, a.next_panorama};
+}
+
+// Gives the keyframes and points of B in a candidate the ids that they have beside a later state of A.
+void Renumber(const JoinedIds& then, const JoinedIds& now, LoopCandidate* candidate) {
+  const auto keyframe = [&](KeyFrameId* id) {
+    if (*id >= then.first_keyframe) *id += now.first_keyframe - then.first_keyframe;
+  };
+  const auto point = [&](MapPointId* id) {
+    if (*id >= then.first_point) *id += now.first_point - then.first_point;
+  };
+  keyframe(&candidate->keyframe);
+  keyframe(&candidate->place);
+  for (Observation& seen : candidate->seen) {
+    keyframe(&seen.keyframe);
+    point(&seen.point);
+  }
+  for (DuplicatePoints& duplicates : candidate->duplicates) {
+    point(&duplicates.known);
+    point(&duplicates.recent);
+  }
+}
+
+// Whether both keyframes of a candidate are in B or still in A.
+bool IsComplete(const LoopCandidate& candidate, const MapComparison& comparison, const MapSnapshot& a) {
+  const auto exists = [&](KeyFrameId id) {
+    return id >= comparison.a->next_keyframe || a.FindKeyFrame(id) != nullptr;
+  };
+  return exists(candidate.keyframe) && exists(candidate.place);
+}
+
 }  // namespace
 
 std::optional<std::string> MapJoiningOptions::Validate() const {
@@ -131,7 +204,7 @@ std::optional<std::string> MapJoiningOptions::Validate() const {
 }
 
 MapSnapshot SideBySide(const MapSnapshot& a, const MapSnapshot& b, JoinedIds* ids) {
-  *ids = {a.next_keyframe, a.next_point, a.next_panorama};
+  *ids = IdsAfter(a);
   MapSnapshot both = a;
   both.revision = std::max(a.revision, b.revision);
   both.next_keyframe += b.next_keyframe;
@@ -169,41 +242,55 @@ MapOverlap CompareMaps(const MapOverlapOptions& options, const MapSnapshot& a, c
   return FindOverlap(options, ids.first_keyframe, interrupt, &map);
 }
 
+MapComparison CompareForJoining(const MapOverlapOptions& options, std::shared_ptr<const MapSnapshot> a,
+                                std::shared_ptr<const MapSnapshot> b, const std::atomic<bool>* interrupt) {
+  const double start = ProcessorSeconds();
+  MapComparison comparison;
+  comparison.overlap = CompareMaps(options, *a, *b, interrupt);
+  comparison.a = std::move(a);
+  comparison.b = std::move(b);
+  comparison.seconds = ProcessorSeconds() - start;
+  return comparison;
+}
+
+bool StillApplies(const MapJoiningOptions& options, const MapComparison& comparison, const MapSnapshot& a) {
+  if (comparison.overlap.outcome != MapOverlap::Outcome::kOverlap) return true;
+  if (!a.corrections.empty() && a.corrections.back()->revision > comparison.a->revision) return false;
+  const auto left = std::ranges::count_if(comparison.overlap.candidates, [&](const LoopCandidate& candidate) {
+    return IsComplete(candidate, comparison, a);
+  });
+  return static_cast<std::size_t>(left) >= options.overlap.min_consecutive;
+}
+
+MapJoinAttempt JoinCompared(const MapJoiningOptions& options, const MapComparison& comparison,
+                            const MapSnapshot& a, const std::atomic<bool>* interrupt) {
+  Checked(options);
+  MapJoinAttempt attempt;
+  if (!MayBeJoined(a, *comparison.b, &attempt)) return attempt;
+  attempt.overlap = comparison.overlap;
+  std::erase_if(attempt.overlap.candidates,
+                [&](const LoopCandidate& candidate) { return !IsComplete(candidate, comparison, a); });
+  JoinedIds ids;
+  Map map = PutTogether(a, *comparison.b, &ids);
+  for (LoopCandidate& candidate : attempt.overlap.candidates)
+    Renumber(IdsAfter(*comparison.a), ids, &candidate);
+  if (auto joined = Unite(options, ids, interrupt, &attempt, &map))
+    Complete(std::move(joined), interrupt, &attempt, &map);
+  return attempt;
+}
+
 MapJoinAttempt JoinMaps(const MapJoiningOptions& options, const MapSnapshot& a, const MapSnapshot& b,
                         const std::atomic<bool>* interrupt) {
   Checked(options);
   MapJoinAttempt attempt;
-  if (HaveTooManyIds(a, b)) {
-    attempt.refusal = JoinRefusal::kTooManyIds;
-    return attempt;
-  }
-  auto joined = std::make_shared<JoinedMap>();
-  Map map = PutTogether(a, b, &joined->ids);
-  const KeyFrameId first_of_b = joined->ids.first_keyframe;
-  attempt.overlap = FindOverlap(options.overlap, first_of_b, interrupt, &map);
-  if (attempt.overlap.outcome != MapOverlap::Outcome::kOverlap) {
-    attempt.refusal = JoinRefusal::kNoOverlap;
-    return attempt;
-  }
-
-  joined->a_from_b = attempt.overlap.a_from_b;
-  std::vector<LoopCandidate> candidates = attempt.overlap.candidates;
-  MoveB(joined->a_from_b, first_of_b, &map);
-  Rescale(joined->a_from_b, first_of_b, &candidates);
-  joined->aligned = map.Snapshot();
-  if (!SpreadDrift(options.correction, candidates, &map)) {
-    attempt.refusal = JoinRefusal::kTooMuchDrift;
-    return attempt;
-  }
-  KeepIdsOfA(joined->ids.first_point, &candidates);
-  joined->points_merged = FuseDuplicatePoints(joined->ids, candidates, interrupt, &map);
+  if (!MayBeJoined(a, b, &attempt)) return attempt;
+  JoinedIds ids;
+  Map map = PutTogether(a, b, &ids);
+  attempt.overlap = FindOverlap(options.overlap, ids.first_keyframe, interrupt, &map);
+  auto joined = Unite(options, ids, interrupt, &attempt, &map);
+  if (!joined) return attempt;
   Adjust(options, interrupt, &map);
-  if (interrupt && *interrupt) {
-    attempt.refusal = JoinRefusal::kInterrupted;
-    return attempt;
-  }
-  joined->map = map.Snapshot();
-  attempt.joined = std::move(joined);
+  Complete(std::move(joined), interrupt, &attempt, &map);
   return attempt;
 }
 

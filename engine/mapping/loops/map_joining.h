@@ -65,6 +65,23 @@ struct MapJoinAttempt {
 MapJoinAttempt JoinMaps(const MapJoiningOptions& options, const MapSnapshot& a, const MapSnapshot& b,
                         const std::atomic<bool>* interrupt);
 
+// Two maps and what a comparison of them gave.
+struct MapComparison {
+  std::shared_ptr<const MapSnapshot> a, b;
+  MapOverlap overlap;  // its keyframes and points have the ids that SideBySide gives them
+  double seconds = 0;  // processor time
+};
+// Both maps must be as for JoinMaps; interrupt may be null.
+MapComparison CompareForJoining(const MapOverlapOptions& options, std::shared_ptr<const MapSnapshot> a,
+                                std::shared_ptr<const MapSnapshot> b, const std::atomic<bool>* interrupt);
+// Whether a comparison says where B is in the present state of A, which was extended and adjusted meanwhile:
+// no loop was closed, and enough of the keyframes that confirm the overlap are left.
+bool StillApplies(const MapJoiningOptions& options, const MapComparison& comparison, const MapSnapshot& a);
+// Joins B into the present state of A, for which the comparison must still apply. Unlike JoinMaps, it leaves
+// the adjustment to the caller, as after a loop was closed: until then the seam has errors of a few pixels.
+MapJoinAttempt JoinCompared(const MapJoiningOptions& options, const MapComparison& comparison,
+                            const MapSnapshot& a, const std::atomic<bool>* interrupt);
+
 // Decides whether two maps show one place, and only that. Both must be as for JoinMaps; interrupt may be
 // null.
 MapOverlap CompareMaps(const MapOverlapOptions& options, const MapSnapshot& a, const MapSnapshot& b,

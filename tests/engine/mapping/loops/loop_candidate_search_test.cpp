@@ -144,7 +144,8 @@ std::vector<LoopCandidate> AllCandidates(const LoopCandidateSearchOptions& optio
   LoopCandidateSearch search(options);
   PointSearcher searcher;
   std::vector<LoopCandidate> candidates;
-  search.Find(keyframe, here, map, &searcher, [&](LoopCandidate candidate) {
+  Neighbourhoods neighbourhoods(options.min_covisibility_ratio, map);
+  search.Find(keyframe, here, &neighbourhoods, &searcher, [&](LoopCandidate candidate) {
     candidates.push_back(std::move(candidate));
     return false;
   });
@@ -153,7 +154,7 @@ std::vector<LoopCandidate> AllCandidates(const LoopCandidateSearchOptions& optio
 std::vector<LoopCandidate> AllCandidates(KeyFrameId keyframe, Map* map) {
   const LoopCandidateSearchOptions options;
   return AllCandidates(options, keyframe,
-                       Neighbourhood(keyframe, options.min_covisibility_ratio, options.hops, map), map);
+                       Neighbourhoods(options.min_covisibility_ratio, map).Of(keyframe, options.hops), map);
 }
 
 TEST(LoopCandidateSearch, FindsThePlaceThatTheCameraReturnedTo) {
@@ -176,7 +177,7 @@ TEST(LoopCandidateSearch, FindsNothingAmongTheKeyframesThatAreExcluded) {
   Map map = ThereAndBack(SmallDrift());
   const KeyFrameId id = testing_world::kReturned[1];
   const LoopCandidateSearchOptions options;
-  IdSet here = Neighbourhood(id, options.min_covisibility_ratio, options.hops, &map);
+  IdSet here = Neighbourhoods(options.min_covisibility_ratio, &map).Of(id, options.hops);
   ASSERT_FALSE(AllCandidates(options, id, here, &map).empty());
   // Keyframes 0 to 5 show what the keyframe shows.
   for (KeyFrameId known = 0; known <= 5; ++known) here.insert(known);
@@ -215,11 +216,12 @@ TEST_F(LoopCandidateSearchInARepeatingGallery, PassesEveryPlaceOnUntilOneIsTaken
     return take;
   };
   const IdSet here = {12, 13, 14};
-  search.Find(kSearched, here, &map, &searcher, note);
+  Neighbourhoods neighbourhoods(LoopCandidateSearchOptions().min_covisibility_ratio, &map);
+  search.Find(kSearched, here, &neighbourhoods, &searcher, note);
   ASSERT_EQ(places.size(), 2u);
   EXPECT_GT(std::abs(places[0] - places[1]), 1.0) << "two keyframes of one place are one candidate";
   take = true;
-  search.Find(kSearched, here, &map, &searcher, note);
+  search.Find(kSearched, here, &neighbourhoods, &searcher, note);
   EXPECT_EQ(places.size(), 3u);
 }
 

@@ -325,6 +325,54 @@ TEST(MapJoining, KeepsTheReadoutTimeEstimatedFromCorners) {
   EXPECT_LT(ReadoutIn(*mapper.Snapshot(), *image)->y(), told + 0.004);
 }
 
+MapComparison CompareOverlappingPair() {
+  return CompareForJoining({}, OverlappingPair().a, OverlappingPair().b, nullptr);
+}
+
+TEST(MapJoining, JoinsAMapThatGrewAfterTheComparison) {
+  const auto& [a, b] = OverlappingPair();
+  const MapComparison comparison = CompareOverlappingPair();
+  Mapper mapper({});
+  mapper.Adopt(a);
+  AddKeyFrameLike(a->keyframes.back(), a->keyframes.back().camera, &mapper);
+  ASSERT_EQ(mapper.Snapshot()->next_keyframe, a->next_keyframe + 1);
+  ASSERT_TRUE(mapper.StillApplies(comparison));
+  const MapJoinAttempt attempt = mapper.Join(comparison, nullptr);
+  ASSERT_NE(attempt.joined, nullptr) << Brief(attempt.overlap);
+  EXPECT_EQ(attempt.joined->ids.first_keyframe, a->next_keyframe + 1);
+  EXPECT_EQ(mapper.Snapshot(), attempt.joined->map);
+  while (mapper.Step()) continue;
+  const MapSnapshot& map = *mapper.Snapshot();
+  EXPECT_EQ(Validate(map), "");
+  EXPECT_NE(map.FindKeyFrame(a->next_keyframe), nullptr) << "the new keyframe is lost";
+  EXPECT_GT(attempt.joined->points_merged, 200);
+  const Sim3 world_from_b = kOther.inverse();
+  for (const KeyFrame& keyframe : b->keyframes) {
+    const KeyFrame* const joined = map.FindKeyFrame(keyframe.id + attempt.joined->ids.first_keyframe);
+    if (!joined) continue;  // it was redundant
+    EXPECT_LT(
+        (joined->camera_from_map.OriginInSource() - world_from_b * keyframe.camera_from_map.OriginInSource())
+            .norm(),
+        0.02);
+  }
+}
+
+TEST(MapJoining, AComparisonNoLongerAppliesAfterALoopWasClosed) {
+  const MapComparison comparison = CompareOverlappingPair();
+  EXPECT_TRUE(StillApplies({}, comparison, *comparison.a));
+  Map closed(*comparison.a);
+  closed.Correct({{comparison.a->keyframes.back().id, {Rotation3(), {0.1, 0, 0}, 1}}});
+  EXPECT_FALSE(StillApplies({}, comparison, *closed.Snapshot()));
+}
+
+TEST(MapJoining, AComparisonNoLongerAppliesWithoutTheKeyframesThatConfirmIt) {
+  const MapComparison comparison = CompareOverlappingPair();
+  Map culled(*comparison.a);
+  for (const LoopCandidate& candidate : comparison.overlap.candidates)
+    culled.RemoveKeyFrame(std::min(candidate.keyframe, candidate.place));
+  EXPECT_FALSE(StillApplies({}, comparison, *culled.Snapshot()));
+}
+
 TEST(MapJoining, LeavesTheMapOfTheMapperUnchangedIfRejected) {
   Mapper mapper({});
   mapper.Adopt(OverlappingPair().a);

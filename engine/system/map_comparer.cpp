@@ -1,0 +1,75 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "engine/system/map_comparer.h"
+
+#include <utility>
+
+#include "engine/base/thread_priority.h"
+
+namespace docent::engine {
+
+MapComparer::MapComparer(const MapOverlapOptions& options, std::function<void()> on_done)
+    : options_(options), on_done_(std::move(on_done)) {}
+
+MapComparer::~MapComparer() {
+  Cancel();
+}
+
+void MapComparer::Start(std::uint64_t number, std::shared_ptr<const MapSnapshot> a,
+                        std::shared_ptr<const MapSnapshot> b) {
+  {
+    const std::scoped_lock lock(mutex_);
+    request_ = Request{number, std::move(a), std::move(b)};
+    result_.reset();
+    interrupt_ = true;
+    // Most sessions compare no maps.
+    if (!worker_) {
+      worker_.emplace("map comparer", [this](const std::stop_token& stop) {
+        LowerThreadPriority();
+        Run(stop);
+      });
+    }
+  }
+  changed_.notify_all();
+}
+
+void MapComparer::Cancel() {
+  const std::scoped_lock lock(mutex_);
+  request_.reset();
+  result_.reset();
+  interrupt_ = true;
+}
+
+std::optional<MapComparer::Result> MapComparer::Take() {
+  const std::scoped_lock lock(mutex_);
+  if (error_) std::rethrow_exception(std::exchange(error_, nullptr));
+  return std::exchange(result_, std::nullopt);
+}
+
+void MapComparer::Run(const std::stop_token& stop) {
+  while (true) {
+    Request request;
+    {
+      std::unique_lock lock(mutex_);
+      if (!changed_.wait(lock, stop, [this] { return request_.has_value(); })) return;
+      request = *std::exchange(request_, std::nullopt);
+      interrupt_ = false;
+    }
+    Result result{request.number, {}};
+    std::exception_ptr error;
+    try {
+      result.comparison =
+          CompareForJoining(options_, std::move(request.a), std::move(request.b), &interrupt_);
+    } catch (...) {
+      error = std::current_exception();
+    }
+    {
+      const std::scoped_lock lock(mutex_);
+      if (interrupt_) continue;
+      result_ = std::move(result);
+      error_ = error;
+    }
+    on_done_();
+  }
+}
+
+}  // namespace docent::engine
