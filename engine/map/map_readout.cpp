@@ -83,7 +83,7 @@ bool SetReadout(const CameraModel& camera, const Eigen::Vector2d& readout_s, Map
   return true;
 }
 
-void UniteReadouts(KeyFrameId first_of_b, Map* map) {
+bool UniteReadouts(KeyFrameId first_of_b, Map* map) {
   std::vector<std::shared_ptr<const CameraModel>> lenses;
   for (const auto& [id, record] : map->keyframes()) {
     const std::shared_ptr<const CameraModel>& image = record.keyframe.camera;
@@ -91,9 +91,12 @@ void UniteReadouts(KeyFrameId first_of_b, Map* map) {
         std::ranges::any_of(lenses, [&](const auto& lens) { return lens->HasSameLens(*image); });
     if (!known && !image->readout_motion().rotation_rate.isZero(0)) lenses.push_back(image);
   }
+  bool changed = false;
   for (const auto& lens : lenses) {
-    if (const auto readout_s = ReadoutOfBoth(first_of_b, *lens, *map)) SetReadout(*lens, *readout_s, map);
+    const auto readout_s = ReadoutOfBoth(first_of_b, *lens, *map);
+    if (readout_s && SetReadout(*lens, *readout_s, map)) changed = true;
   }
+  return changed;
 }
 
 }  // namespace docent::engine

@@ -31,7 +31,7 @@ bool SetReadout(const CameraModel& camera, const Eigen::Vector2d& readout_s, Map
 
 // The same for all lenses of two maps in one, of which B has the keyframes from first_of_b on. All images of
 // a lens get what a calibration states; otherwise that of A, or of B if A has none. A readout time of zero
-// counts as none, because that of a rolling shutter is zero until it is estimated.
-void UniteReadouts(KeyFrameId first_of_b, Map* map);
+// counts as none, because that of a rolling shutter is zero until it is estimated. True if something changed.
+bool UniteReadouts(KeyFrameId first_of_b, Map* map);
 
 }  // namespace docent::engine

@@ -54,6 +54,8 @@ class MapRefinement {
   // other, and no adjustment would ever be completed.
   bool IsAdjustmentOverdue() const { return to_adjust_.size() > 1; }
   bool HasNewPoints() const { return !to_match_.empty(); }
+  // True until the remaining error of a loop was adjusted.
+  bool HasLoopToAdjust() const { return loop_to_adjust_; }
   bool NeedsGlobalAdjustment() const;
   bool MayHaveRedundantKeyFrames() const { return culling_due_; }
 

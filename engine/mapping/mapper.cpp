@@ -90,7 +90,7 @@ MapJoinAttempt Mapper::Join(const MapSnapshot& other, const std::atomic<bool>* i
 MapJoinAttempt Mapper::Join(const MapComparison& comparison, const std::atomic<bool>* interrupt) {
   const double start = ProcessorSeconds();
   queue_.BeginOtherWork();
-  MapJoinAttempt attempt = JoinCompared(options_.joining, comparison, *workspace_.map.Snapshot(), interrupt);
+  MapJoinAttempt attempt = JoinCompared(options_.joining, comparison, *output_.Snapshot(), interrupt);
   if (attempt.joined) {
     ResumeFrom(attempt.joined->map.get());
     refinement_.RequireAdjustmentOfLoop();

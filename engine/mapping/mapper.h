@@ -31,12 +31,20 @@ class Mapper {
   // seconds; must not be called during a Step(). interrupt may be null.
   MapJoinAttempt Join(const MapSnapshot& other, const std::atomic<bool>* interrupt);
   // The same once the other map has been compared with this one, in a state from which the comparison still
-  // applies. It takes a second at most for a large map, because the adjustment is left to later steps, which
-  // a keyframe interrupts.
+  // applies. The adjustment is left to later steps, which a keyframe interrupts.
+  MapJoinAttempt Join(const MapComparison& comparison, const std::atomic<bool>* interrupt);
   bool StillApplies(const MapComparison& comparison) const {
     return engine::StillApplies(options_.joining, comparison, *Snapshot());
   }
-  MapJoinAttempt Join(const MapComparison& comparison, const std::atomic<bool>* interrupt);
+  // Whether a join would interrupt no task: new keyframes and points would miss their local adjustment, and
+  // a loop would not be closed.
+  bool MayJoin() const {
+    return refinement_.IsLocallyAdjusted() && !refinement_.HasNewPoints() && !loops_.HasLoop();
+  }
+  // The remaining error of a loop or a join is yet to be adjusted. A map that is adopted again needs it
+  // still.
+  bool HasLoopToAdjust() const { return refinement_.HasLoopToAdjust(); }
+  void RequireAdjustmentOfLoop() { refinement_.RequireAdjustmentOfLoop(); }
 
   // They return false if the queue is full. The times of the keyframes of one map ascend.
   bool Offer(KeyFrameCandidate candidate) { return queue_.Offer(std::move(candidate)); }

@@ -16,10 +16,14 @@ MapComparer::~MapComparer() {
 
 void MapComparer::Start(std::uint64_t number, std::shared_ptr<const MapSnapshot> a,
                         std::shared_ptr<const MapSnapshot> b) {
+  // Freeing a large snapshot takes a while, and is done without the lock.
+  std::optional<Request> request = Request{number, std::move(a), std::move(b)};
+  std::optional<Result> dropped;
   {
     const std::scoped_lock lock(mutex_);
-    request_ = Request{number, std::move(a), std::move(b)};
-    result_.reset();
+    request_.swap(request);
+    result_.swap(dropped);
+    error_ = nullptr;
     interrupt_ = true;
     // Most sessions compare no maps.
     if (!worker_) {
@@ -33,9 +37,12 @@ void MapComparer::Start(std::uint64_t number, std::shared_ptr<const MapSnapshot>
 }
 
 void MapComparer::Cancel() {
+  std::optional<Request> request;
+  std::optional<Result> dropped;
   const std::scoped_lock lock(mutex_);
-  request_.reset();
-  result_.reset();
+  request_.swap(request);
+  result_.swap(dropped);
+  error_ = nullptr;
   interrupt_ = true;
 }
 
@@ -65,7 +72,7 @@ void MapComparer::Run(const std::stop_token& stop) {
     {
       const std::scoped_lock lock(mutex_);
       if (interrupt_) continue;
-      result_ = std::move(result);
+      if (!error) result_ = std::move(result);
       error_ = error;
     }
     on_done_();

@@ -17,8 +17,8 @@
 namespace docent::engine {
 
 // Compares two maps on a thread of its own, because a comparison takes seconds, in which the mapper has
-// keyframes to insert. One comparison at a time; all functions may be called from any thread and do not wait
-// for it, but for the destructor, which interrupts it.
+// keyframes to insert. One comparison at a time. All functions may be called from any thread, and none waits
+// for a comparison except the destructor, which interrupts it.
 class MapComparer {
  public:
   // on_done: called on the comparing thread once Take has a result. No lock is held.
@@ -36,7 +36,7 @@ class MapComparer {
     std::uint64_t number = 0;  // that Start was given
     MapComparison comparison;
   };
-  // The result of the last comparison, once. Rethrows an exception that ended it.
+  // The result of the last comparison, once; empty if there is none yet. Rethrows an exception that ended it.
   std::optional<Result> Take();
 
  private:
@@ -54,7 +54,7 @@ class MapComparer {
   std::condition_variable_any changed_;
   std::optional<Request> request_;
   std::optional<Result> result_;
-  std::exception_ptr error_;
+  std::exception_ptr error_;      // instead of a result
   std::optional<Worker> worker_;  // from the first Start on; last: it uses the other members
 };
 

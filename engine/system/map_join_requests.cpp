@@ -54,7 +54,7 @@ void MapJoinRequests::Handle(const MapJoinAttempt& attempt, KnownMap* into) {
   KnownMap& from = state_.maps.at(request.from);
   if (!attempt.joined) {
     if (attempt.overlap.outcome == MapOverlap::Outcome::kInterrupted) return;
-    from.join_at = CompareAgainAt(KeyFramesOf(*into->snapshot, *request.snapshot), attempt_growth_);
+    from.join_at = CompareAgainAt(attempt.keyframes, attempt_growth_);
     JoinRefused event{from.key, attempt.refusal, attempt.overlap, std::exchange(from.join_asked, false)};
     event.overlap.candidates.clear();
     state_.Emit(state_.LastTime(), into->key, std::move(event));

@@ -33,7 +33,7 @@ class MapJoinRequests {
   void Handle(const MapJoinAttempt& attempt, KnownMap* into);
   // The mapper begins with another snapshot, whatever it had joined.
   void Cancel() { pending_.reset(); }
-  // Whether the mapper is joining this map into the active one.
+  // Whether this map is being compared with the active one, or joined into it.
   bool IsJoining(std::uint64_t key) const { return pending_ && pending_->from == key; }
 
  private:

@@ -123,7 +123,9 @@ void MappingThread::ApplyAdoption() {
     // Copying a large map takes a while; adoption_ stays set meanwhile, so that no keyframe is offered.
     const Adoption adoption = *adoption_;
     lock.unlock();
+    if (mapper_.HasLoopToAdjust()) loops_to_adjust_.insert(key_);
     mapper_.Adopt(adoption.snapshot);
+    if (loops_to_adjust_.erase(adoption.key) > 0) mapper_.RequireAdjustmentOfLoop();
     mapper_.TakeEvents();  // discards events of the previous map
     key_ = adoption.key;
     adoption_number_ = adoption.number;
@@ -155,9 +157,9 @@ void MappingThread::CompareIfRequested() {
   if (adoption_ || !join_) return;
   Compare(join_->number, std::move(join_->other));
   join_.reset();
+  compared_again_ = false;
 }
 
-// With mutex_ held.
 void MappingThread::Compare(std::uint64_t number, std::shared_ptr<const MapSnapshot> other) {
   comparer_.Start(number, mapper_.Snapshot(), std::move(other));
   comparing_ = true;
@@ -166,19 +168,25 @@ void MappingThread::Compare(std::uint64_t number, std::shared_ptr<const MapSnaps
 
 void MappingThread::JoinIfCompared() {
   std::optional<MapComparer::Result> result;
+  bool applies = true;
   {
     const std::scoped_lock lock(mutex_);
-    if (adoption_ || !compared_) return;
-    comparing_ = compared_ = false;
+    if (adoption_ || !compared_ || !mapper_.MayJoin()) return;
+    compared_ = false;
+    // Empty if a comparison was dropped just when it was done.
     result = comparer_.Take();
     if (!result) return;
-    if (!mapper_.StillApplies(result->comparison)) {
+    comparing_ = false;
+    applies = mapper_.StillApplies(result->comparison);
+    if (!applies && !std::exchange(compared_again_, true)) {
       Compare(result->number, std::move(result->comparison.b));
       return;
     }
     interrupt_join_ = false;
   }
-  ReportJoin(result->number, mapper_.Join(result->comparison, &interrupt_join_));
+  // A map that is corrected again and again must not wait for ever.
+  ReportJoin(result->number, applies ? mapper_.Join(result->comparison, &interrupt_join_)
+                                     : mapper_.Join(*result->comparison.b, &interrupt_join_));
 }
 
 void MappingThread::ReportJoin(std::uint64_t number, MapJoinAttempt attempt) {
@@ -232,14 +240,14 @@ void MappingThread::Run(const std::stop_token& stop) {
     }
     ApplyAdoption();
     CompareIfRequested();
-    JoinIfCompared();
     bool more = true;
     while (more && !stop.stop_requested()) {
+      JoinIfCompared();
       more = StepOnce();
       {
         const std::scoped_lock lock(mutex_);
         // has_work_ is set as well, so the outer loop continues with them.
-        if (adoption_ || pair_ || join_ || compared_) more = false;
+        if (adoption_ || pair_ || join_) more = false;
       }
       changed_.notify_all();
     }
@@ -271,13 +279,13 @@ void MappingThread::Finish() {
     const std::scoped_lock lock(mutex_);
     join_.reset();
     interrupt_join_ = true;
-    comparer_.Cancel();
-    comparing_ = compared_ = false;
   }
   if (threaded) {
     worker_->RequestStop();
     worker_->Join();
   }
+  // The mapper's last steps may have led to a comparison.
+  comparer_.Cancel();
   const auto start = std::chrono::steady_clock::now();
   for (int step = 0; step < kMaxLastSteps && StepOnce(); ++step) {
     if (threaded && std::chrono::steady_clock::now() - start > kLongest) return;

@@ -9,6 +9,7 @@
 #include <memory>
 #include <mutex>
 #include <optional>
+#include <set>
 #include <stop_token>
 #include <string>
 #include <vector>
@@ -67,8 +68,8 @@ class MappingThread {
   void RunLockstep();
   // Threaded only: every request was served, and no maps are being compared.
   bool IsIdle() const;
-  // Threaded only: waits while the mapper works, at most until `latest`, and beyond it while the mapper is a
-  // whole keyframe behind or initializes a map.
+  // Threaded only: waits while the mapper works or maps are compared, at most until `latest`, and beyond it
+  // while the mapper is a whole keyframe behind or initializes a map.
   void WaitUntilIdle(std::chrono::steady_clock::time_point latest, const std::stop_token& stop);
 
   MapperTimes Times() const { return mapper_.Times(); }
@@ -91,11 +92,11 @@ class MappingThread {
 
   void Run(const std::stop_token& stop);
   void ReportFailure();
-  void ApplyAdoption();    // serves a pending adoption and start
-  void JoinIfRequested();  // after ApplyAdoption
-  void CompareIfRequested();
-  void JoinIfCompared();
-  void Compare(std::uint64_t number, std::shared_ptr<const MapSnapshot> other);
+  void ApplyAdoption();       // serves a pending adoption and start
+  void JoinIfRequested();     // lockstep only, after ApplyAdoption
+  void CompareIfRequested();  // threaded only, after ApplyAdoption
+  void JoinIfCompared();      // the same
+  void Compare(std::uint64_t number, std::shared_ptr<const MapSnapshot> other);  // with mutex_ held
   void ReportJoin(std::uint64_t number, MapJoinAttempt attempt);
   bool HasNothingToDo() const { return idle_ && !has_work_ && !comparing_; }  // with mutex_ held
   bool StepOnce();
@@ -107,6 +108,8 @@ class MappingThread {
   std::uint64_t key_ = 0;
   std::uint64_t adoption_number_ = 0;
   std::shared_ptr<const MapSnapshot> last_snapshot_;
+  std::set<std::uint64_t> loops_to_adjust_;  // maps that were left with a loop or a join to be adjusted
+  bool compared_again_ = false;              // the first result of this comparison did not apply any more
 
   mutable std::mutex mutex_;  // guards the members below; never held during a step
   std::condition_variable_any changed_;

@@ -99,7 +99,7 @@ class System {
   bool IsInUse(std::uint64_t key) const;
   // Whether the map was started here and its depth has not been confirmed yet; it may still be discarded.
   bool IsProvisional(std::uint64_t key) const;
-  // Whether the mapper has nothing urgent to do.
+  // Whether the mapper has nothing urgent to do, and compares no maps.
   bool IsMapperIdle() const { return mapping_.IsIdle(); }
   // What the mapper has spent its time on so far.
   MapperTimes MappingTimes() const { return mapping_.Times(); }

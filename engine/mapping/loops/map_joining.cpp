@@ -20,11 +20,14 @@ namespace {
 constexpr std::size_t kJoinNeighbours = 16;
 
 // Both maps in one, with one readout time for all images of a lens.
-Map PutTogether(const MapSnapshot& a, const MapSnapshot& b, JoinedIds* ids) {
-  Map map(SideBySide(a, b, ids));
-  UniteReadouts(ids->first_keyframe, &map);
-  return map;
-}
+struct TwoInOne {
+  TwoInOne(const MapSnapshot& a, const MapSnapshot& b)
+      : map(SideBySide(a, b, &ids)), readout_changed(UniteReadouts(ids.first_keyframe, &map)) {}
+
+  JoinedIds ids;
+  Map map;
+  bool readout_changed;
+};
 
 // Transforms the part of the map that came from B by the similarity.
 void MoveB(const Sim3& a_from_b, KeyFrameId first_of_b, Map* map) {
@@ -65,12 +68,17 @@ void KeepIdsOfA(MapPointId first_of_b, std::vector<LoopCandidate>* candidates) {
   }
 }
 
-// The remaining error at the seam takes several adjustments: rounds with Huber's loss while the cost
-// decreases considerably, then one with the standard loss.
-void Adjust(const MapJoiningOptions& options, const std::atomic<bool>* interrupt, Map* map) {
+MapAdjustmentOptions FirstAdjustment(const MapJoiningOptions& options) {
   MapAdjustmentOptions adjustment;
   adjustment.global_iterations = options.global_iterations;
   adjustment.global_loss = RobustLoss::kHuber;
+  return adjustment;
+}
+
+// The remaining error at the seam takes several adjustments: rounds with Huber's loss while the cost
+// decreases considerably, then one with the standard loss.
+void Adjust(const MapJoiningOptions& options, const std::atomic<bool>* interrupt, Map* map) {
+  MapAdjustmentOptions adjustment = FirstAdjustment(options);
   for (int round = 0; round < options.max_rounds; ++round) {
     const BundleSummary summary = AdjustGlobally(adjustment, interrupt, map);
     if (summary.final_cost >= options.max_cost_ratio * summary.initial_cost) break;
@@ -119,34 +127,39 @@ bool HaveTooManyIds(const MapSnapshot& a, const MapSnapshot& b) {
          full(a.next_panorama, b.next_panorama);
 }
 
-// Whether a joined map may exist; otherwise the attempt says why not.
+// Whether the maps may be joined; otherwise the attempt says why not.
 bool MayBeJoined(const MapSnapshot& a, const MapSnapshot& b, MapJoinAttempt* attempt) {
-  if (HaveTooManyIds(a, b)) attempt->refusal = JoinRefusal::kTooManyIds;
+  if (attempt->overlap.outcome != MapOverlap::Outcome::kOverlap) {
+    attempt->refusal = JoinRefusal::kNoOverlap;
+  } else if (HaveTooManyIds(a, b)) {
+    attempt->refusal = JoinRefusal::kTooManyIds;
+  }
   return attempt->refusal == JoinRefusal::kNone;
 }
 
-// Joins both maps in one according to attempt->overlap, but for the adjustment. Null if they cannot be
-// joined; then the attempt says why.
-std::shared_ptr<JoinedMap> Unite(const MapJoiningOptions& options, const JoinedIds& ids,
-                                 const std::atomic<bool>* interrupt, MapJoinAttempt* attempt, Map* map) {
-  if (attempt->overlap.outcome != MapOverlap::Outcome::kOverlap) {
-    attempt->refusal = JoinRefusal::kNoOverlap;
-    return nullptr;
-  }
+// Joins both maps according to attempt->overlap, but for the adjustment. Null if that would bend them too
+// far.
+std::shared_ptr<JoinedMap> Unite(const MapJoiningOptions& options, const std::atomic<bool>* interrupt,
+                                 MapJoinAttempt* attempt, TwoInOne* both) {
+  const JoinedIds& ids = both->ids;
   auto joined = std::make_shared<JoinedMap>();
   joined->ids = ids;
   joined->a_from_b = attempt->overlap.a_from_b;
   std::vector<LoopCandidate> candidates = attempt->overlap.candidates;
-  MoveB(joined->a_from_b, ids.first_keyframe, map);
+  MoveB(joined->a_from_b, ids.first_keyframe, &both->map);
   Rescale(joined->a_from_b, ids.first_keyframe, &candidates);
-  joined->aligned = map->Snapshot();
-  if (!SpreadDrift(options.correction, candidates, map)) {
+  joined->aligned = both->map.Snapshot();
+  if (!SpreadDrift(options.correction, candidates, &both->map)) {
     attempt->refusal = JoinRefusal::kTooMuchDrift;
     return nullptr;
   }
   KeepIdsOfA(ids.first_point, &candidates);
-  joined->points_merged = FuseDuplicatePoints(ids, candidates, interrupt, map);
+  joined->points_merged = FuseDuplicatePoints(ids, candidates, interrupt, &both->map);
   return joined;
+}
+
+std::size_t KeyFramesOf(const MapSnapshot& a, const MapSnapshot& b) {
+  return a.keyframes.size() + b.keyframes.size();
 }
 
 void Complete(std::shared_ptr<JoinedMap> joined, const std::atomic<bool>* interrupt, MapJoinAttempt* attempt,
@@ -237,9 +250,8 @@ MapOverlap CompareMaps(const MapOverlapOptions& options, const MapSnapshot& a, c
                        const std::atomic<bool>* interrupt) {
   Checked(options);
   if (HaveTooManyIds(a, b)) return {};
-  JoinedIds ids;
-  Map map = PutTogether(a, b, &ids);
-  return FindOverlap(options, ids.first_keyframe, interrupt, &map);
+  TwoInOne both(a, b);
+  return FindOverlap(options, both.ids.first_keyframe, interrupt, &both.map);
 }
 
 MapComparison CompareForJoining(const MapOverlapOptions& options, std::shared_ptr<const MapSnapshot> a,
@@ -266,16 +278,18 @@ MapJoinAttempt JoinCompared(const MapJoiningOptions& options, const MapCompariso
                             const MapSnapshot& a, const std::atomic<bool>* interrupt) {
   Checked(options);
   MapJoinAttempt attempt;
-  if (!MayBeJoined(a, *comparison.b, &attempt)) return attempt;
+  attempt.keyframes = KeyFramesOf(*comparison.a, *comparison.b);
   attempt.overlap = comparison.overlap;
+  if (!MayBeJoined(a, *comparison.b, &attempt)) return attempt;
   std::erase_if(attempt.overlap.candidates,
                 [&](const LoopCandidate& candidate) { return !IsComplete(candidate, comparison, a); });
-  JoinedIds ids;
-  Map map = PutTogether(a, *comparison.b, &ids);
+  TwoInOne both(a, *comparison.b);
   for (LoopCandidate& candidate : attempt.overlap.candidates)
-    Renumber(IdsAfter(*comparison.a), ids, &candidate);
-  if (auto joined = Unite(options, ids, interrupt, &attempt, &map))
-    Complete(std::move(joined), interrupt, &attempt, &map);
+    Renumber(IdsAfter(*comparison.a), both.ids, &candidate);
+  auto joined = Unite(options, interrupt, &attempt, &both);
+  if (!joined) return attempt;
+  if (both.readout_changed) AdjustGlobally(FirstAdjustment(options), interrupt, &both.map);
+  Complete(std::move(joined), interrupt, &attempt, &both.map);
   return attempt;
 }
 
@@ -283,14 +297,18 @@ MapJoinAttempt JoinMaps(const MapJoiningOptions& options, const MapSnapshot& a, 
                         const std::atomic<bool>* interrupt) {
   Checked(options);
   MapJoinAttempt attempt;
+  attempt.keyframes = KeyFramesOf(a, b);
+  if (HaveTooManyIds(a, b)) {
+    attempt.refusal = JoinRefusal::kTooManyIds;
+    return attempt;
+  }
+  TwoInOne both(a, b);
+  attempt.overlap = FindOverlap(options.overlap, both.ids.first_keyframe, interrupt, &both.map);
   if (!MayBeJoined(a, b, &attempt)) return attempt;
-  JoinedIds ids;
-  Map map = PutTogether(a, b, &ids);
-  attempt.overlap = FindOverlap(options.overlap, ids.first_keyframe, interrupt, &map);
-  auto joined = Unite(options, ids, interrupt, &attempt, &map);
+  auto joined = Unite(options, interrupt, &attempt, &both);
   if (!joined) return attempt;
-  Adjust(options, interrupt, &map);
-  Complete(std::move(joined), interrupt, &attempt, &map);
+  Adjust(options, interrupt, &both.map);
+  Complete(std::move(joined), interrupt, &attempt, &both.map);
   return attempt;
 }
 

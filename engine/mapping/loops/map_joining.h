@@ -2,6 +2,7 @@
 #pragma once
 
 #include <atomic>
+#include <cstddef>
 #include <cstdint>
 #include <memory>
 #include <optional>
@@ -13,7 +14,8 @@
 // Joins two maps that show one place (map_overlap.h verifies that they do). Map A keeps its coordinates, its
 // scale and its ids; map B is transformed into them with everything in it, panorama maps and infinite points
 // included. All images of a lens get one readout time (UniteReadouts). Points that both maps contain are
-// fused, and the joined map is adjusted. Pure functions: any thread, equal input gives an equal result.
+// fused, and the joined map is adjusted, by JoinCompared only as far as it must be at once. Pure functions:
+// any thread, equal input gives an equal result.
 namespace docent::engine {
 
 struct MapJoiningOptions {
@@ -59,6 +61,7 @@ struct MapJoinAttempt {
   MapOverlap overlap;                       // its keyframes have the ids of the joined map
   std::shared_ptr<const JoinedMap> joined;  // null if the maps were not joined
   JoinRefusal refusal = JoinRefusal::kNone;
+  std::size_t keyframes = 0;  // of both maps when they were compared
 };
 
 // Both maps must be valid (Validate) and have full features (MakeFeatures). interrupt may be null.
@@ -75,10 +78,12 @@ struct MapComparison {
 MapComparison CompareForJoining(const MapOverlapOptions& options, std::shared_ptr<const MapSnapshot> a,
                                 std::shared_ptr<const MapSnapshot> b, const std::atomic<bool>* interrupt);
 // Whether a comparison says where B is in the present state of A, which was extended and adjusted meanwhile:
-// no loop was closed, and enough of the keyframes that confirm the overlap are left.
+// A has no later correction (of a loop or of a lens), and of the keyframes that confirm the overlap at least
+// MapOverlapOptions::min_consecutive are left.
 bool StillApplies(const MapJoiningOptions& options, const MapComparison& comparison, const MapSnapshot& a);
 // Joins B into the present state of A, for which the comparison must still apply. Unlike JoinMaps, it leaves
 // the adjustment to the caller, as after a loop was closed: until then the seam has errors of a few pixels.
+// Only where a readout time changes, which displaces much more, one adjustment is done.
 MapJoinAttempt JoinCompared(const MapJoiningOptions& options, const MapComparison& comparison,
                             const MapSnapshot& a, const std::atomic<bool>* interrupt);
 

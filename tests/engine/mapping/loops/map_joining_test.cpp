@@ -357,6 +357,33 @@ TEST(MapJoining, JoinsAMapThatGrewAfterTheComparison) {
   }
 }
 
+TEST(MapJoining, WaitsUntilNewKeyframesAreAdjusted) {
+  const KeyFrame& last = OverlappingPair().a->keyframes.back();
+  Mapper mapper({});
+  mapper.Adopt(OverlappingPair().a);
+  EXPECT_TRUE(mapper.MayJoin());
+  KeyFrameCandidate candidate;
+  candidate.time = last.time + FromSeconds(1);
+  candidate.camera = last.camera;
+  candidate.features = last.features;
+  candidate.camera_from_map = last.camera_from_map;
+  ASSERT_TRUE(mapper.Offer(candidate));
+  ASSERT_TRUE(mapper.Step());
+  EXPECT_FALSE(mapper.MayJoin());
+  while (mapper.Step()) continue;
+  EXPECT_TRUE(mapper.MayJoin());
+}
+
+TEST(MapJoining, AComparedMapGetsTheReadoutTimeOfTheOther) {
+  const auto a = WithImages(*OverlappingPair().a, TurningImage(0.01, 0.02)),
+             b = WithImages(*OverlappingPair().b, TurningImage(0.01, 0));
+  const MapJoinAttempt attempt = JoinCompared({}, CompareForJoining({}, a, b, nullptr), *a, nullptr);
+  ASSERT_NE(attempt.joined, nullptr) << Brief(attempt.overlap);
+  EXPECT_EQ(attempt.keyframes, a->keyframes.size() + b->keyframes.size());
+  for (const KeyFrame& keyframe : attempt.joined->map->keyframes)
+    EXPECT_EQ(keyframe.camera->readout_motion().readout_s, Eigen::Vector2d(0, 0.02)) << keyframe.id;
+}
+
 TEST(MapJoining, AComparisonNoLongerAppliesAfterALoopWasClosed) {
   const MapComparison comparison = CompareOverlappingPair();
   EXPECT_TRUE(StillApplies({}, comparison, *comparison.a));
