@@ -113,13 +113,14 @@ void MapPolicy::CheckProvisionalMap(std::size_t index, const TrackedFrame& frame
   const auto found = state_.maps.find(assignment.map());
   if (found == state_.maps.end()) return;
   KnownMap& map = found->second;
-  const auto reason = map.provisional.Check(options_.provisional,
-                                            {.frame = frame,
-                                             .in_map = frame.map_key == map.key,
-                                             .map = map.snapshot.get(),
-                                             .lost_since = assignment.lost_since(),
-                                             .may_extend = options_.extend_maps,
-                                             .may_discard = map.started_here && map.permissions.discard});
+  const auto reason =
+      map.provisional.Check(options_.provisional, {.frame = frame,
+                                                   .in_map = frame.map_key == map.key,
+                                                   .map = map.snapshot.get(),
+                                                   .lost_since = assignment.lost_since(),
+                                                   .may_extend = options_.extend_maps,
+                                                   .may_discard = map.started_here && map.permissions.discard,
+                                                   .starting = mapping_.IsStarting(map.key)});
   if (reason) Discard(index, frame.frame.time, *reason);
 }
 

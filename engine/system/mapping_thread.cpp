@@ -82,6 +82,11 @@ bool MappingThread::Start(std::uint64_t key, InitialPair pair) {
   return true;
 }
 
+bool MappingThread::IsStarting(std::uint64_t key) const {
+  const std::scoped_lock lock(mutex_);
+  return starting_ && requested_key_ == key;
+}
+
 void MappingThread::Join(std::uint64_t key, std::uint64_t number, std::shared_ptr<const MapSnapshot> other) {
   {
     const std::scoped_lock lock(mutex_);

@@ -55,6 +55,8 @@ class MappingThread {
   // Initializes the map of `key` from its first two views; false when another map was adopted since. The pair
   // waits while the queue of keyframes is full.
   bool Start(std::uint64_t key, InitialPair pair);
+  // Whether the views given to Start for the map of `key` are waiting or being used.
+  bool IsStarting(std::uint64_t key) const;
   // Joins another map into the map of `key` (see Mapper::Join). Unless in lockstep, the maps are compared on
   // a thread of their own, while the mapper extends its map. Ignored when a map, even the same one, is
   // adopted before it is done; then no update reports it. A newer request replaces a pending one.

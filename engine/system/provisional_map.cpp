@@ -28,8 +28,8 @@ std::optional<MapDiscarded> ProvisionalMap::Check(const ProvisionalMapOptions& o
   };
   MapDiscarded reason;
   if (seen.may_extend && seen.map && !seen.map->HasFinitePoints()) {
-    // A map without finite points is quickly made again.
-    if (!is_lost_for(options.panorama_loss_time)) return std::nullopt;
+    // A map without finite points is quickly made again. One that gets them just now may find the camera.
+    if (seen.starting || !is_lost_for(options.panorama_loss_time)) return std::nullopt;
     if (!seen.may_discard) {
       pending_ = false;
       return std::nullopt;

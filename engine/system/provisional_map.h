@@ -44,6 +44,7 @@ class ProvisionalMap {
     std::optional<Timestamp> lost_since = std::nullopt;  // of the frame's camera
     bool may_extend = true;                              // maps are extended at all
     bool may_discard = true;
+    bool starting = false;  // the mapper has the two views that give it depth
   };
   // To be called with every frame of a camera that is in the map, by ascending time. Returns why the map
   // should be discarded; empty while it may stay, or may not be discarded.

@@ -64,6 +64,20 @@ TEST_F(NewMap, IsConfirmedByTime) {
   EXPECT_FALSE(Lose(9, 4)) << "it is no longer provisional";
 }
 
+TEST_F(NewMap, IsKeptWhileTheMapperGivesItDepth) {
+  map_->points.clear();
+  TrackedFrame lost;
+  lost.frame.time = FromSeconds(3);
+  lost.state = TrackingState::kLost;
+  ProvisionalMap::Observation seen{
+      .frame = lost, .map = map_.get(), .lost_since = FromSeconds(1.2), .starting = true};
+  EXPECT_FALSE(provisional_.Check(options_, seen));
+  seen.starting = false;
+  const auto discarded = provisional_.Check(options_, seen);
+  ASSERT_TRUE(discarded);
+  EXPECT_EQ(discarded->reason, Reason::kLostWithoutDepth);
+}
+
 TEST_F(NewMap, IsConfirmedByKeyFrames) {
   map_->keyframes.resize(options_.keyframes);
   EXPECT_FALSE(Track(1.1));
