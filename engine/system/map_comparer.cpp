@@ -16,34 +16,28 @@ MapComparer::~MapComparer() {
 
 void MapComparer::Start(std::uint64_t number, std::shared_ptr<const MapSnapshot> a,
                         std::shared_ptr<const MapSnapshot> b) {
-  // Freeing a large snapshot takes a while, and is done without the lock.
-  std::optional<Request> request = Request{number, std::move(a), std::move(b)};
-  std::optional<Result> dropped;
-  {
-    const std::scoped_lock lock(mutex_);
-    request_.swap(request);
-    result_.swap(dropped);
-    error_ = nullptr;
-    interrupt_ = true;
-    // Most sessions compare no maps.
-    if (!worker_) {
-      worker_.emplace("map comparer", [this](const std::stop_token& stop) {
-        LowerThreadPriority();
-        Run(stop);
-      });
-    }
-  }
+  Replace(Request{number, std::move(a), std::move(b)});
   changed_.notify_all();
 }
 
 void MapComparer::Cancel() {
-  std::optional<Request> request;
+  Replace(std::nullopt);
+}
+
+void MapComparer::Replace(std::optional<Request> request) {
+  // Freeing a large snapshot takes a while, and is done without the lock.
   std::optional<Result> dropped;
   const std::scoped_lock lock(mutex_);
   request_.swap(request);
   result_.swap(dropped);
   error_ = nullptr;
   interrupt_ = true;
+  // Most sessions compare no maps.
+  if (!request_ || worker_) return;
+  worker_.emplace("map comparer", [this](const std::stop_token& stop) {
+    LowerThreadPriority();
+    Run(stop);
+  });
 }
 
 std::optional<MapComparer::Result> MapComparer::Take() {

@@ -45,6 +45,8 @@ class MapComparer {
     std::shared_ptr<const MapSnapshot> a, b;
   };
 
+  // Drops the comparison for another one, or for none.
+  void Replace(std::optional<Request> request);
   void Run(const std::stop_token& stop);
 
   const MapOverlapOptions options_;

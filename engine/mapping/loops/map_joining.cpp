@@ -129,10 +129,10 @@ bool HaveTooManyIds(const MapSnapshot& a, const MapSnapshot& b) {
 
 // Whether the maps may be joined; otherwise the attempt says why not.
 bool MayBeJoined(const MapSnapshot& a, const MapSnapshot& b, MapJoinAttempt* attempt) {
-  if (attempt->overlap.outcome != MapOverlap::Outcome::kOverlap) {
-    attempt->refusal = JoinRefusal::kNoOverlap;
-  } else if (HaveTooManyIds(a, b)) {
+  if (HaveTooManyIds(a, b)) {
     attempt->refusal = JoinRefusal::kTooManyIds;
+  } else if (attempt->overlap.outcome != MapOverlap::Outcome::kOverlap) {
+    attempt->refusal = JoinRefusal::kNoOverlap;
   }
   return attempt->refusal == JoinRefusal::kNone;
 }

@@ -384,6 +384,15 @@ TEST(MapJoining, AComparedMapGetsTheReadoutTimeOfTheOther) {
     EXPECT_EQ(keyframe.camera->readout_motion().readout_s, Eigen::Vector2d(0, 0.02)) << keyframe.id;
 }
 
+TEST(MapJoining, SaysThatComparedMapsHaveTooManyIds) {
+  auto full = std::make_shared<MapSnapshot>(*OverlappingPair().b);
+  full->next_point = kNoId - 1;
+  const auto& a = OverlappingPair().a;
+  const MapJoinAttempt attempt = JoinCompared({}, CompareForJoining({}, a, full, nullptr), *a, nullptr);
+  EXPECT_EQ(attempt.joined, nullptr);
+  EXPECT_EQ(attempt.refusal, JoinRefusal::kTooManyIds);
+}
+
 TEST(MapJoining, AComparisonNoLongerAppliesAfterALoopWasClosed) {
   const MapComparison comparison = CompareOverlappingPair();
   EXPECT_TRUE(StillApplies({}, comparison, *comparison.a));
