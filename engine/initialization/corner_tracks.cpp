@@ -17,7 +17,7 @@ namespace {
 
 constexpr float kMinCorrelation = 0.8f;
 constexpr float kMaxRoundTripPx = 0.7f;  // of the corner's level, tracked forwards and backwards
-constexpr double kFineGrid = 2;          // its density, for plain scenes
+constexpr double kFineGrid = 2;          // its density, for scenes of low texture
 constexpr float kMaxStepPx = 4.0f;       // of each level: how far the alignment may move from the prediction
 
 // Tracks one patch of `from` into `to`, from coarse levels to the corner's own level.
@@ -86,7 +86,7 @@ std::optional<std::string> CornerTracksOptions::Validate() const {
   return OptionCheck()
       .That(std::ranges::all_of(corners, [](int count) { return count >= 0; }),
             "The number of corners of a level must be at least 0.")
-      .AtLeast(plain_scene_corners, 0, "number of corners in a plain scene")
+      .AtLeast(low_texture_corners, 0, "number of corners in a scene of low texture")
       .Ratio(min_alive_ratio, "ratio of tracked corners")
       .AtLeast(min_alive, 0, "number of tracked corners")
       .AtLeast(max_age_frames, 1, "age of the first view")
@@ -154,8 +154,8 @@ void CornerTracks::Start(Timestamp time, const std::shared_ptr<const ImageFeatur
   views_.clear();
   images_[++image_ % kRememberedImages] = {time, Rotation3()};
   AddCorners(*features, 1);
-  plain_scene_ = HasFewCorners();
-  if (plain_scene_) {
+  is_low_texture_ = HasFewCorners();
+  if (is_low_texture_) {
     trails_.clear();
     AddCorners(*features, kFineGrid);
   }
@@ -209,14 +209,14 @@ void CornerTracks::Track(Timestamp time, const std::shared_ptr<const ImageFeatur
   const FirstView& newest_view = views_.back();
   const bool lost_many = static_cast<double>(newest_view.alive) <
                          options_.next_view_alive_ratio * static_cast<double>(newest_view.corners_at_start);
-  if (!plain_scene_ || !lost_many || static_cast<int>(views_.size()) == options_.max_views) return;
+  if (!is_low_texture_ || !lost_many || static_cast<int>(views_.size()) == options_.max_views) return;
   AddCorners(*features, 1);
   if (HasFewCorners()) AddCorners(*features, kFineGrid);
   AddView(time, features);
 }
 
 bool CornerTracks::HasFewCorners() const {
-  return static_cast<int>(trails_.size()) < options_.plain_scene_corners;
+  return static_cast<int>(trails_.size()) < options_.low_texture_corners;
 }
 
 bool CornerTracks::HasEnough(const FirstView& view) const {

@@ -20,22 +20,24 @@ namespace docent::engine {
 
 struct CornerTracksOptions {
   std::array<int, 3> corners = {350, 200, 100};  // maximum number to track, by level
-  // Plain surfaces have corners only where there are objects. Where the grid finds fewer than this, one twice
-  // as fine is used, since the tracks of a third are lost within ten images of a hand-held phone, and with
-  // fewer than min_alive the search starts again: of six runs with such a recording, one had depth within
-  // four seconds with the coarse grid, all with the fine one. In a furnished room, 360 corners are found.
-  int plain_scene_corners = 200;
+  // Surfaces of low texture have corners only where there are objects. Where the grid finds fewer than this,
+  // one twice as fine is used, since the tracks of a third are lost within ten images of a hand-held phone,
+  // and with fewer than min_alive the search starts again: of six runs with such a recording, one had depth
+  // within four seconds with the coarse grid, all with the fine one. In a furnished room, 360 corners are
+  // found.
+  int low_texture_corners = 200;
   double min_alive_ratio = 0.3;  // of the corners of a first view; with fewer, it ends
   int min_alive = 80;            // corners; with fewer, a first view ends
   int max_age_frames = 240;      // a first view that is older than this and than max_age ends
   // The time of 240 images at 30 a second: a camera with more images a second needs as long to move.
   Timestamp max_age = std::chrono::seconds(8);
-  // In a plain scene, once fewer corners of the newest first view than this ratio are left, the image becomes
-  // a further first view, and corners are added where none are left. In fast motion, the corners of a first
-  // view are lost just before their parallax is significant, and with a single one it is chance whether that
-  // was a suitable image: of 60 runs with a recording of a plain scene and its variants (half of the images,
-  // half the resolution, turned, backwards), 29 % of the images had depth with one first view, 66 % with up
-  // to six. Not elsewhere: the corners that remain are the distant ones, and more of them cost time.
+  // In a scene of low texture, once fewer corners of the newest first view than this ratio are left, the
+  // image becomes a further first view, and corners are added where none are left. In fast motion, the
+  // corners of a first view are lost just before their parallax is significant, and with a single one it is
+  // chance whether that was a suitable image: of 60 runs with a recording of such a scene and its variants
+  // (half of the images, half the resolution, turned, backwards), 29 % of the images had depth with one first
+  // view, 66 % with up to six. Not elsewhere: the corners that remain are the distant ones, and more of them
+  // cost time.
   double next_view_alive_ratio = 0.85;
   int max_views = 6;  // at most CornerTracks::kMaxViews
 
@@ -70,7 +72,7 @@ class CornerTracks {
   // Makes an image the only first view.
   void Start(Timestamp time, const std::shared_ptr<const ImageFeatures>& features);
   // Tracks the corners into the next image, which becomes the only first view if all others end there, and
-  // may become a further one in a plain scene. now_from_previous: predicts where the corners are.
+  // may become a further one in a scene of low texture. now_from_previous: predicts where the corners are.
   void Track(Timestamp time, const std::shared_ptr<const ImageFeatures>& features, const CameraModel& camera,
              const Rotation3& now_from_previous);
 
@@ -121,7 +123,7 @@ class CornerTracks {
   CornerTracksOptions options_;
   std::vector<Trail> trails_;  // in the order of their ids
   std::vector<FirstView> views_;
-  bool plain_scene_ = false;  // the first image had few corners
+  bool is_low_texture_ = false;  // the first image had few corners
   std::uint32_t next_id_ = 0;
   std::uint32_t image_ = 0;                                      // number of the current image
   std::array<CornerSequence::Image, kRememberedImages> images_;  // by number, modulo

@@ -38,9 +38,9 @@ struct InitializerOptions {
 };
 
 // Initializes a map from two views: tracks corners from a first view through the images and estimates the
-// two-view geometry until it is reliable (ptamm §2.3) and a third view has confirmed it. In a plain scene,
-// several first views are tried (CornerTracks). Until then hint() says what is missing. One per camera, on
-// the tracker's thread.
+// two-view geometry until it is reliable (ptamm §2.3) and a third view has confirmed it. In a scene of low
+// texture, several first views are tried (CornerTracks). Until then hint() says what is missing. One per
+// camera, on the tracker's thread.
 class Initializer {
  public:
   // Estimates the readout time. Called only where two views have depth, since that takes long.

@@ -88,8 +88,8 @@ void KeyFrameInsertion::InsertSixDof(const KeyFrameCandidate& candidate) {
   MatchMapPoints(options_.guided_matching, id, &workspace_->searcher, &map);
   map.UpdateDepth(record);
   std::vector<MapPointId> created;
-  for (const KeyFrameId partner : Partners(id)) {
-    const auto points = CreatePoints(options_.creation, id, partner, &map, &workspace_->searcher);
+  for (const KeyFrameId neighbour : Neighbours(id)) {
+    const auto points = CreatePoints(options_.creation, id, neighbour, &map, &workspace_->searcher);
     created.insert(created.end(), points.begin(), points.end());
   }
   refinement_->AddPoints(created);
@@ -109,7 +109,7 @@ void KeyFrameInsertion::InsertSixDof(const KeyFrameCandidate& candidate) {
   }
 }
 
-std::vector<KeyFrameId> KeyFrameInsertion::Partners(KeyFrameId id) {
+std::vector<KeyFrameId> KeyFrameInsertion::Neighbours(KeyFrameId id) {
   Map& map = workspace_->map;
   const Map::KeyFrameRecord& record = *map.FindKeyFrame(id);
   const Eigen::Vector3d center = record.keyframe.camera_from_map.OriginInSource();
@@ -122,19 +122,19 @@ std::vector<KeyFrameId> KeyFrameInsertion::Partners(KeyFrameId id) {
     if (shared < 15) break;
     const Rigid3& pose = map.FindKeyFrame(other)->keyframe.camera_from_map;
     const double baseline = (pose.OriginInSource() - center).norm() / record.keyframe.mean_depth;
-    if (baseline < options_.min_partner_baseline || baseline > options_.max_partner_baseline) continue;
+    if (baseline < options_.min_neighbour_baseline || baseline > options_.max_neighbour_baseline) continue;
     // Large overlap helps matching; a baseline of about 0.15 depths helps triangulation.
     const double fit = std::min(baseline / 0.15, 0.15 / baseline);
     scored.push_back({-shared * std::sqrt(fit), other});
   }
   std::stable_sort(scored.begin(), scored.end(),
                    [](const Scored& a, const Scored& b) { return a.score < b.score; });
-  std::vector<KeyFrameId> partners;
-  for (const Scored& partner : scored) {
-    if (static_cast<int>(partners.size()) >= options_.partners) break;
-    partners.push_back(partner.id);
+  std::vector<KeyFrameId> neighbours;
+  for (const Scored& neighbour : scored) {
+    if (static_cast<int>(neighbours.size()) >= options_.neighbours) break;
+    neighbours.push_back(neighbour.id);
   }
-  return partners;
+  return neighbours;
 }
 
 }  // namespace docent::engine

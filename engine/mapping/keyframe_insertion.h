@@ -10,7 +10,7 @@ namespace docent::engine {
 
 // The mapper's task of inserting an offered keyframe into its map (ptamm §2.3): applies the trackers' reports
 // on points, follows corrections of the map, searches the map's points in the keyframe, and creates new ones
-// with earlier keyframes. On the stepping thread only.
+// with earlier keyframes. On the thread that runs the mapper only.
 class KeyFrameInsertion {
  public:
   // The pointers are borrowed.
@@ -38,7 +38,7 @@ class KeyFrameInsertion {
   Rigid3 PoseInPresentMap(const KeyFrameCandidate& candidate);
   void InsertSixDof(const KeyFrameCandidate& candidate);
   // The keyframes in which the corners of this one are searched.
-  std::vector<KeyFrameId> Partners(KeyFrameId keyframe);
+  std::vector<KeyFrameId> Neighbours(KeyFrameId keyframe);
 
   const MapperOptions& options_;
   const LensEstimation* const lens_estimation_;

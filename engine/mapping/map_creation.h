@@ -6,7 +6,7 @@
 namespace docent::engine {
 
 // The mapper's task of making the first map: from two views with depth (ptamm §2.3), or from one view that
-// gives only infinite points. On the stepping thread only.
+// gives only infinite points. On the thread that runs the mapper only.
 class MapCreation {
  public:
   // The pointers are borrowed.

@@ -19,7 +19,7 @@ namespace docent::engine {
 
 // The mapper's tasks that improve a map without extending it: searching new points in earlier keyframes,
 // local and global bundle adjustment, and culling of keyframes. It remembers which of them is due. On the
-// stepping thread only, apart from IsLocallyAdjusted.
+// thread that runs the mapper only, apart from IsLocallyAdjusted.
 class MapRefinement {
  public:
   // The pointers are borrowed. An adjustment stops when *interrupt becomes true, and remains due.

@@ -9,7 +9,7 @@
 namespace docent::engine {
 
 // The map that the mapper works on, with what its tasks derive from it. The mapper owns it, its tasks borrow
-// it; on the stepping thread only.
+// it; on the thread that runs the mapper only.
 struct MapWorkspace {
   explicit MapWorkspace(const SearchOptions& search) : searcher(search), descriptors(DefaultVocabulary()) {}
 

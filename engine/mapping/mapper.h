@@ -71,7 +71,7 @@ class Mapper {
   void FixKeyFrames();
   // Removes the oldest temporary keyframes above their largest number (FindOldestKeyFrame).
   void RemoveOldTemporaryKeyFrames();
-  // Resets the state of the stepping thread to a map; the queue is not changed.
+  // Resets the state of the thread that runs the mapper to a map; the queue is not changed.
   void ResumeFrom(const MapSnapshot* snapshot);
   void Serve(MapperQueue::Request request);
   // Does the most urgent task apart from queued keyframes. Returns the account for its time; null if there
@@ -87,7 +87,7 @@ class Mapper {
   const MapperOptions options_;
   MapperQueue queue_;
   MapperOutput output_;
-  // The members below are used by the stepping thread only, and each uses those above it.
+  // The members below are used by the thread that runs the mapper only, and each uses those above it.
   MapWorkspace workspace_;
   LoopCloser loops_;
   LensEstimation lens_estimation_;

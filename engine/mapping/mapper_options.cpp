@@ -9,10 +9,10 @@ std::optional<std::string> MapperOptions::Validate() const {
   return OptionCheck()
       .That(max_queue > 0, "The queue of the mapper must hold at least one keyframe.")
       .Positive(initial_baseline, "baseline of two initial views")
-      .AtLeast(partners, 0, "number of partners of a keyframe")
-      .AtLeast(min_partner_baseline, 0, "smallest baseline of a partner")
-      .That(max_partner_baseline > min_partner_baseline,
-            "The largest baseline of a partner must exceed the smallest.")
+      .AtLeast(neighbours, 0, "number of neighbours of a keyframe")
+      .AtLeast(min_neighbour_baseline, 0, "smallest baseline of a neighbour")
+      .That(max_neighbour_baseline > min_neighbour_baseline,
+            "The largest baseline of a neighbour must exceed the smallest.")
       .AtLeast(min_initial_points, 1, "number of points of a new map")
       .Contained(guided_matching.Validate())
       .Contained(creation.Validate())
@@ -22,7 +22,7 @@ std::optional<std::string> MapperOptions::Validate() const {
       .Contained(culling.Validate())
       .AtLeast(min_initial_directions, 1, "number of infinite points of a new map")
       .Positive(min_infinite_parallax_deg, "parallax of an infinite point")
-      .AtLeast(conversion_partners, 0, "number of partners of a localized keyframe")
+      .AtLeast(conversion_neighbours, 0, "number of neighbours of a localized keyframe")
       .Contained(adjustment.Validate())
       .Contained(loops.Validate())
       .Contained(joining.Validate())

@@ -23,11 +23,11 @@
 namespace docent::engine {
 
 struct MapperOptions {
-  std::size_t max_queue = 3;           // keyframes that wait to be inserted (ptamm §2.2)
-  double initial_baseline = 0.1;       // distance of the two initial views if it is unknown, ptamm §2.3
-  int partners = 3;                    // keyframes in which the corners of a new keyframe are searched
-  double min_partner_baseline = 0.03;  // ratio of the keyframe's median depth
-  double max_partner_baseline = 0.6;   // ratio of the keyframe's median depth
+  std::size_t max_queue = 3;             // keyframes that wait to be inserted (ptamm §2.2)
+  double initial_baseline = 0.1;         // distance of the two initial views if it is unknown, ptamm §2.3
+  int neighbours = 3;                    // keyframes in which the corners of a new keyframe are searched
+  double min_neighbour_baseline = 0.03;  // ratio of the keyframe's median depth
+  double max_neighbour_baseline = 0.6;   // ratio of the keyframe's median depth
   int min_initial_points = 60;  // after the first adjustment; with fewer the initialization is given up
   GuidedMatchingOptions guided_matching;
   PointCreationOptions creation;
@@ -40,7 +40,7 @@ struct MapperOptions {
   // further away (hybrid-slam §5.2).
   double min_infinite_parallax_deg = 1.5;
   // Keyframes in which the infinite points of a localized keyframe are searched.
-  int conversion_partners = 30;
+  int conversion_neighbours = 30;
   MapAdjustmentOptions adjustment;
   LoopOptions loops;
   MapJoiningOptions joining;

@@ -19,8 +19,8 @@ struct MapperTimes {
   double max_queue_latency = 0;  // seconds; longest time that one step delayed an offered keyframe
 };
 
-// What the mapper has to show: its newest snapshot, events, lenses and times. The stepping thread writes,
-// any thread reads.
+// What the mapper has to show: its newest snapshot, events, lenses and times. The thread that runs the mapper
+// writes, any thread reads.
 class MapperOutput {
  public:
   explicit MapperOutput(std::vector<EstimatedLens> lenses) : lenses_(std::move(lenses)) {}

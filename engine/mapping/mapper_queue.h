@@ -17,7 +17,7 @@ namespace docent::engine {
 
 // What the trackers hand to the mapper: keyframes, first views of a map, and reports on points. It also
 // measures how long the mapper's work delays what is offered meanwhile. All functions may be called from any
-// thread, but work begins and ends on the stepping thread.
+// thread, but work begins and ends on the thread that runs the mapper.
 class MapperQueue {
  public:
   // A keyframe to be inserted, two views that start a map, or corners that determine the readout time of a

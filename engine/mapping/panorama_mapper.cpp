@@ -116,7 +116,8 @@ void PanoramaMapper::PlanConversions(KeyFrameId id) {
     if (other == id || record.keyframe.kind == KeyFrameKind::kPanorama) continue;
     const double depth = std::min(record.keyframe.mean_depth, keyframe.mean_depth);
     const double baseline = (record.keyframe.camera_from_map.OriginInSource() - center).norm() / depth;
-    if (baseline < options_.min_partner_baseline || baseline > 2 * options_.max_partner_baseline) continue;
+    if (baseline < options_.min_neighbour_baseline || baseline > 2 * options_.max_neighbour_baseline)
+      continue;
     const double rotation =
         (keyframe.camera_from_map.rotation * record.keyframe.camera_from_map.rotation.inverse()).Angle();
     if (rotation > kMaxRotation) continue;
@@ -125,7 +126,7 @@ void PanoramaMapper::PlanConversions(KeyFrameId id) {
   }
   std::stable_sort(pairs.begin(), pairs.end(),
                    [](const auto& a, const auto& b) { return a.first < b.first; });
-  const auto wanted = static_cast<std::size_t>(options_.conversion_partners);
+  const auto wanted = static_cast<std::size_t>(options_.conversion_neighbours);
   for (std::size_t i = 0; i < pairs.size() && i < wanted; ++i) to_convert_.push_back(pairs[i].second);
 }
 

@@ -14,7 +14,7 @@ namespace docent::engine {
 
 // The mapper's tasks on panorama maps (hybrid-slam §5): inserts panorama keyframes, localizes them once there
 // are finite points, and triangulates infinite points that localized keyframes see from two centres. It
-// remembers which keyframes and pairs wait. On the stepping thread only.
+// remembers which keyframes and pairs wait. On the thread that runs the mapper only.
 class PanoramaMapper {
  public:
   // The pointers are borrowed.

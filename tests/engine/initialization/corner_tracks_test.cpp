@@ -42,10 +42,10 @@ std::size_t CornersAtStart(const CornerTracksOptions& options, const cv::Mat& im
 
 TEST(CornerTracks, TakeMoreCornersOfTheObjectsInAPlainScene) {
   CornerTracksOptions coarse;
-  coarse.plain_scene_corners = 0;
+  coarse.low_texture_corners = 0;
   const cv::Mat object = ImageWithObject(kObject_px, 160), furnished = ImageWithObject(240, 160);
   EXPECT_LT(CornersAtStart(coarse, object),
-            static_cast<std::size_t>(CornerTracksOptions().plain_scene_corners));
+            static_cast<std::size_t>(CornerTracksOptions().low_texture_corners));
   EXPECT_GT(CornersAtStart({}, object), 1.1 * static_cast<double>(CornersAtStart(coarse, object)));
   EXPECT_EQ(CornersAtStart({}, furnished), CornersAtStart(coarse, furnished));
 }

@@ -120,8 +120,8 @@ TEST(EngineOptions, SayInOneSentenceWhatIsOutOfRange) {
        "The number of searched leaves must be from 1 to 16."},
       {After<MapperOptions>([](auto* o) { o->max_queue = 0; }),
        "The queue of the mapper must hold at least one keyframe."},
-      {After<MapperOptions>([](auto* o) { o->max_partner_baseline = o->min_partner_baseline; }),
-       "The largest baseline of a partner must exceed the smallest."},
+      {After<MapperOptions>([](auto* o) { o->max_neighbour_baseline = o->min_neighbour_baseline; }),
+       "The largest baseline of a neighbour must exceed the smallest."},
   };
   for (const auto& test : cases) EXPECT_EQ(test.validate(), test.sentence);
 }
