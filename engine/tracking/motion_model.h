@@ -18,21 +18,28 @@ class MotionModel {
     time_ = time;
     camera_from_map_ = camera_from_map;
     before_miss_.reset();
+    center_time_.reset();
     twist_per_second_.setZero();
+  }
+  // After Reset: the centre of the pose is that of an earlier time, and the camera rotates at this rate
+  // (radians per second, camera frame).
+  void SetRotating(Timestamp center_time, const Eigen::Vector3d& rate_per_second) {
+    center_time_ = center_time;
+    twist_per_second_.tail<3>() = rate_per_second;
   }
   void Update(Timestamp time, const Rigid3& camera_from_map) {
     const double seconds = SecondsUntil(time);
     if (seconds > 0) {
+      const Eigen::Matrix<double, 6, 1> measured = MeanTwist(time, camera_from_map);
       const double usual = usual_interval_s_ > 0 ? usual_interval_s_ : seconds;
       usual_interval_s_ = 0.9 * usual + 0.1 * std::min(seconds, 2 * usual);
-      const Eigen::Matrix<double, 6, 1> measured =
-          (camera_from_map * camera_from_map_.inverse()).Log() / seconds;
       // Low-pass filter: hand-held motion is smooth, single measurements are noisy.
       twist_per_second_ = 0.4 * twist_per_second_ + 0.6 * measured;
     }
     time_ = time;
     camera_from_map_ = camera_from_map;
     before_miss_.reset();
+    center_time_.reset();
   }
   // To be called when no pose was found: the velocity is halved.
   void Miss(Timestamp time) {
@@ -70,6 +77,13 @@ class MotionModel {
     const double seconds = ToSeconds(time - time_);
     return seconds > 0 ? std::max(seconds, 0.5 * usual_interval_s_) : seconds;
   }
+  // The left twist per second from the last pose to this later one.
+  Eigen::Matrix<double, 6, 1> MeanTwist(Timestamp time, const Rigid3& camera_from_map) const {
+    const double seconds = SecondsUntil(time);
+    Eigen::Matrix<double, 6, 1> twist = (camera_from_map * camera_from_map_.inverse()).Log() / seconds;
+    if (center_time_) twist.head<3>() *= seconds / std::max(seconds, ToSeconds(time - *center_time_));
+    return twist;
+  }
   // Of the last pose: its time, and its left twist (translation, rotation) per second.
   const Eigen::Matrix<double, 6, 1>& twist_per_second() const { return twist_per_second_; }
   Timestamp time() const { return time_; }
@@ -79,7 +93,8 @@ class MotionModel {
   Timestamp time_{};
   double usual_interval_s_ = 0;  // between two poses; 0 if not known yet
   Rigid3 camera_from_map_;
-  std::optional<Rigid3> before_miss_;  // the pose before the last frame, if that one has none
+  std::optional<Rigid3> before_miss_;     // the pose before the last frame, if that one has none
+  std::optional<Timestamp> center_time_;  // of the last centre, if it is not that of the last pose
   Eigen::Matrix<double, 6, 1> twist_per_second_ = Eigen::Matrix<double, 6, 1>::Zero();
 };
 

@@ -46,6 +46,16 @@ void PoseTracker::Begin(Timestamp time, const Rigid3& camera_from_map, ObservedM
   observed_ = observed;
 }
 
+void PoseTracker::BeginWithDepth(Timestamp time, const Rigid3& camera_from_map, bool tracked) {
+  const Timestamp newest = motion_.time();
+  if (!tracked || newest <= time) return Begin(time, camera_from_map, ObservedMotion::kSixDof);
+  const Rotation3 rotation = motion_.last().rotation;
+  const Eigen::Vector3d rate_per_second = motion_.twist_per_second().tail<3>();
+  const Eigen::Vector3d center = camera_from_map.OriginInSource();
+  Begin(newest, Rigid3(rotation, -(rotation * center)), ObservedMotion::kSixDof);
+  motion_.SetRotating(time, rate_per_second);
+}
+
 void PoseTracker::ContinueFrom(const PoseTracker& other) {
   map_tracker_.ForgetLastFrame();
   map_tracker_.EnablePanorama(kNoId);
@@ -217,9 +227,7 @@ void PoseTracker::AccountForReadout(const CameraImage& image, const Rigid3& pred
   if (!options_.readout.enabled || image.is_repeated) return;
   const double seconds = motion_.SecondsUntil(image.time);
   if (!(seconds > 0)) return;
-  const auto mean_twist = [&] {
-    return Eigen::Matrix<double, 6, 1>((result->camera_from_map * motion_.last().inverse()).Log() / seconds);
-  };
+  const auto mean_twist = [&] { return motion_.MeanTwist(image.time, result->camera_from_map); };
   // The mean twist since the last frame is that of half a frame ago: it is extrapolated to the present.
   Eigen::Matrix<double, 6, 1> twist = mean_twist();
   if (mean_twist_) twist += 0.5 * (twist - *mean_twist_);

@@ -38,6 +38,9 @@ class PoseTracker {
   void Reset();
   // A map was started, and this is the newest pose known in it.
   void Begin(Timestamp time, const Rigid3& camera_from_map, ObservedMotion observed);
+  // The panorama map that was tracked until now, if tracked, got its first finite points from two views, of
+  // which the second has this time and pose. A rotation that was tracked since then is kept.
+  void BeginWithDepth(Timestamp time, const Rigid3& camera_from_map, bool tracked);
   // Goes on from the last pose of another tracker in a copy of its map.
   void ContinueFrom(const PoseTracker& other);
   // Transforms everything in map coordinates by the corrections between two snapshots. tracked: the last

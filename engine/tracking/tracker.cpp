@@ -91,10 +91,13 @@ void Tracker::SetMap(std::shared_ptr<const MapSnapshot> map, std::uint64_t map_k
     // camera may have added one since.
     initialization_.Finish();
     offers_.Restart();
-    const auto own = std::find_if(map_->keyframes.rbegin(), map_->keyframes.rend(),
-                                  [this](const KeyFrame& k) { return k.camera->HasSameLens(*camera_); });
+    const auto own =
+        std::find_if(map_->keyframes.rbegin(), map_->keyframes.rend(), [this](const KeyFrame& k) {
+          return k.kind == KeyFrameKind::kSixDof && k.camera->HasSameLens(*camera_);
+        });
     const KeyFrame& newest = own == map_->keyframes.rend() ? map_->keyframes.back() : *own;
-    pose_.Begin(newest.time, newest.camera_from_map, ObservedMotion::kSixDof);
+    // The mapper took its time, and the camera may have rotated meanwhile.
+    pose_.BeginWithDepth(newest.time, newest.camera_from_map, same && IsTracked(state_));
     state_ = TrackedState(confirmation_);
   } else if (!same) {
     pose_.Reset();

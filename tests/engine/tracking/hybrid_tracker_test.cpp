@@ -126,6 +126,43 @@ TEST(HybridTracker, GainsDepthWithoutLosingFramesOrKeyframes) {
   }
 }
 
+// The mapper needs up to half a second for the first depth, and the camera does not wait for it.
+TEST(HybridTracker, KeepsTheRotationOfTheImagesThatCameWhileTheFirstDepthWasMade) {
+  constexpr int kImagesMeanwhile = 12;
+  constexpr double kTurn_deg = 2;  // per image
+  const RenderedWorld world = testing_world::Chamber(101);
+  Tracker tracker({}, Camera(), 1);
+  Mapper mapper({});
+  tracker.StartNewMap();
+  std::optional<InitialPair> pair;
+  int image = 0;
+  const auto map = [&] {
+    for (int step = 0; step < 20 && !mapper.IsIdle(); ++step) mapper.Step();
+    mapper.Step();
+    if (mapper.Snapshot()) tracker.SetMap(mapper.Snapshot(), 1);
+  };
+  for (; image < kTurnBegin && !pair; ++image) {
+    tracker.Track(TourFrame(image), nullptr);
+    pair = tracker.TakeInitialPair();
+    if (pair) break;
+    if (auto candidate = tracker.TakeKeyFrameCandidate(); candidate && mapper.Offer(std::move(*candidate)))
+      tracker.KeyFrameAccepted();
+    map();
+  }
+  ASSERT_TRUE(pair);
+  const auto turn_on = [&](int images) {
+    const Rigid3 pose = CameraAt({0, 0, 0}, {0, kTurn_deg * images, 0}) * TourPose(image);
+    return tracker.Track(testing_world::MakeFrame(image + images, world, pose), nullptr);
+  };
+  for (int i = 1; i <= kImagesMeanwhile; ++i) ASSERT_TRUE(HasPose(turn_on(i).state)) << i;
+  ASSERT_TRUE(mapper.Start(std::move(*pair)));
+  map();
+  ASSERT_TRUE(mapper.Snapshot()->HasFinitePoints());
+  const TrackedFrame tracked = turn_on(kImagesMeanwhile + 1);
+  EXPECT_TRUE(HasPose(tracked.state));
+  EXPECT_GT(tracked.finite_points, 30);
+}
+
 TEST(HybridTracker, TracksAPureRotationAndReturns) {
   const Tour& tour = HybridTour();
   const int first = FirstFrameWithDepth(tour);

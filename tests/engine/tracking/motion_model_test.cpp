@@ -86,6 +86,25 @@ TEST(MotionModel, RotatesAboutTheCentreWhenOnlyTheRotationIsKnown) {
   EXPECT_LT((predicted.rotation.inverse() * (turn * Screw(0).rotation)).Angle(), 1e-12);
 }
 
+TEST(MotionModel, MeasuresTheVelocityFromTheTimeOfTheCentre) {
+  MotionModel model;
+  const Eigen::Vector3d rate(0, 1.5, 0), velocity(0.3, 0, 0);
+  const auto at = [&](double seconds, double centre_seconds) {
+    const Rotation3 rotation = Rotation3::Exp(rate * seconds);
+    return Rigid3(rotation, -(rotation * Eigen::Vector3d(velocity * centre_seconds)));
+  };
+  // The rotation was tracked for half a second, and the centre is that of the beginning.
+  model.Reset(FromSeconds(0.5), at(0.5, 0));
+  model.SetRotating(FromSeconds(0), rate);
+  const Rigid3 predicted = model.Predict(FromSeconds(0.6));
+  EXPECT_LT((predicted.rotation.inverse() * at(0.6, 0).rotation).Angle(), 1e-9);
+  EXPECT_LT(predicted.OriginInSource().norm(), 1e-9);
+  model.Update(FromSeconds(0.6), at(0.6, 0.6));
+  EXPECT_NEAR(model.twist_per_second().head<3>().norm(), 0.6 * velocity.norm(), 0.02);
+  model.Update(FromSeconds(0.7), at(0.7, 0.7));
+  EXPECT_LT(model.twist_per_second().head<3>().norm(), 1.1 * velocity.norm());
+}
+
 // The frame of a loss has been predicted with the velocity already: the rotation of its image must not be
 // added to that.
 TEST(MotionModel, RotatesThePoseBeforeALossInTheFrameOfTheLoss) {
