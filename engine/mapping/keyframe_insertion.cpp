@@ -12,31 +12,35 @@ namespace docent::engine {
 void KeyFrameInsertion::Insert(const KeyFrameCandidate& offered, std::span<const PointReport> reports) {
   ApplyReports(reports);
   KeyFrameCandidate candidate = WithCorrections(offered);
-  if (candidate.choice == KeyFrameChoice::kPanorama) {
-    panoramas_->Insert(candidate);
-    return;
-  }
   const bool moved = candidate.map_revision != 0 && candidate.map_revision < workspace_->map.moved_in();
   if (moved) candidate.camera_from_map = PoseInPresentMap(candidate);
-  InsertSixDof(candidate);
+  if (candidate.choice == KeyFrameChoice::kPanorama) {
+    panoramas_->Insert(candidate);
+  } else {
+    InsertSixDof(candidate);
+  }
 }
 
 Rigid3 KeyFrameInsertion::PoseInPresentMap(const KeyFrameCandidate& candidate) {
-  constexpr int kMinPoints = 30;  // twice what a pose needs
+  // Of a candidate of a panorama map only the rotation is known.
+  const bool is_rotation = candidate.choice == KeyFrameChoice::kPanorama;
+  const int min_points = is_rotation ? 15 : 30;  // five times as many as degrees of freedom
   std::vector<PoseMeasurement> measurements;
   for (const PointMatch& match : candidate.matches) {
     const Map::PointRecord* point = workspace_->map.FindPoint(match.point);
-    if (!point || point->point.infinite()) continue;
+    if (!point || point->point.infinite() != is_rotation) continue;
+    if (is_rotation && point->point.panorama != candidate.panorama) continue;
     measurements.push_back({point->point.point_in_map, match.pixel.cast<double>(),
                             1.0 / static_cast<double>(1 << match.level), 1.0});
   }
-  if (static_cast<int>(measurements.size()) < kMinPoints) return candidate.camera_from_map;
+  if (static_cast<int>(measurements.size()) < min_points) return candidate.camera_from_map;
   PoseRefinementMemory memory;
   const Rigid3& start = candidate.camera_from_map;
   const PoseRefinement refined =
       RefinePose(*candidate.camera, start, {}, &measurements, &memory, {Eigen::Vector3d::Zero(), start});
-  const bool found = refined.converged && refined.observed == ObservedMotion::kSixDof &&
-                     2 * refined.finite_inliers > static_cast<int>(measurements.size());
+  const auto observed = is_rotation ? ObservedMotion::kPanorama : ObservedMotion::kSixDof;
+  const bool found = refined.converged && refined.observed == observed &&
+                     2 * refined.inliers > static_cast<int>(measurements.size());
   return found ? refined.camera_from_map : start;
 }
 
