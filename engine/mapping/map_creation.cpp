@@ -1,7 +1,18 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "engine/mapping/map_creation.h"
 
+#include <opencv2/core.hpp>
+
 namespace docent::engine {
+
+namespace {
+
+bool ShowSameImage(const ImageFeatures& a, const ImageFeatures& b) {
+  const cv::Mat &first = a.small_blurry.pixels, &second = b.small_blurry.pixels;
+  return first.size() == second.size() && cv::norm(first, second, cv::NORM_INF) == 0;
+}
+
+}  // namespace
 
 void MapCreation::CreateFromPair(const InitialPair& pair) {
   Map& map = workspace_->map;
@@ -42,11 +53,11 @@ void MapCreation::CreateFromPair(const InitialPair& pair) {
 KeyFrameId MapCreation::AddFirstView(const InitialPair& pair) {
   Map& map = workspace_->map;
   KeyFrameId a = kNoId;
-  // Another camera may have a keyframe of the same time.
+  // Another camera, or an earlier session, may have a keyframe of the same time.
   const auto lens = lens_estimation_->CurrentModel(pair.a.camera ? pair.a.camera : pair.camera);
   for (auto& [id, record] : map.keyframes()) {
     record.keyframe.fixed = false;
-    if (record.keyframe.time == pair.a.time &&
+    if (record.keyframe.time == pair.a.time && ShowSameImage(*record.keyframe.features, *pair.a.features) &&
         lens_estimation_->CurrentModel(record.keyframe.camera)->HasSameLens(*lens))
       a = id;
   }

@@ -44,7 +44,8 @@ void MapAssignment::SetLost(Timestamp time) {
 
 MapAssignment::Order MapAssignment::TakeOrder(bool has_finite_points) {
   const Order order = std::exchange(order_, Order::kNone);
-  if (order == Order::kStart || order == Order::kStartAfterLoss) starting_ = true;
+  if (order == Order::kStart || order == Order::kStartAfterLoss || order == Order::kGiveDepth)
+    starting_ = true;
   if (order == Order::kLeave || order == Order::kEnter) starting_ = false;
   // A map without finite points still waits for its initialization.
   if (has_finite_points) starting_ = false;

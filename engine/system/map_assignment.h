@@ -18,12 +18,15 @@ class MapAssignment {
     kStart,           // start a new map
     kStartAfterLoss,  // the same, while the known maps are searched too
     kStartAgain,      // the mapper could not make the map
+    kGiveDepth,       // search initial views for the map without depth that it is tracked in
     kLeave,           // leave the map, and search all maps
     kEnter,           // search the map
   };
 
   // The camera starts this map. after_loss: because it was lost in another one.
   void Start(std::uint64_t map, bool after_loss);
+  // It is tracked in a map without finite points, which no camera is starting.
+  void GiveDepth() { order_ = Order::kGiveDepth; }
   // Another camera starts this map.
   void WaitFor(std::uint64_t map);
   // It searches this map.
@@ -31,7 +34,10 @@ class MapAssignment {
   // It searches all maps.
   void Leave();
   // Its tracker entered this map by itself.
-  void Follow(std::uint64_t map) { map_ = map; }
+  void Follow(std::uint64_t map) {
+    map_ = map;
+    starting_ = false;
+  }
   // Its pose was refused: it searches the map unless something else was ordered.
   void SearchAgain();
   // The mapper could not make the map of the initial views; nothing for a camera that does not start it.

@@ -38,6 +38,29 @@ void MapPolicy::HandleResult(std::size_t index, TrackedFrame* frame) {
   // With several cameras, one that is tracked shows that the initialization holds.
   if (has_pose || !state_.association.AnyTracked()) CheckProvisionalMap(index, *frame);
   if (!has_pose) CheckLoss(index, *frame);
+  CheckDepth(index, *frame);
+}
+
+// A map without finite points gets them from the camera that started it. One that was entered later, or whose
+// camera is gone, gets them from a camera that is tracked in it.
+void MapPolicy::CheckDepth(std::size_t index, const TrackedFrame& frame) {
+  MapAssignment& assignment = state_.cameras[index].assignment;
+  if (frame.state != TrackingState::kPanorama || assignment.has_order() || assignment.is_starting()) return;
+  const KnownMap* const map = state_.FindMap(frame.map_key);
+  if (map == nullptr || !map->snapshot || map->snapshot->HasFinitePoints()) return;
+  if (frame.map_key != state_.active_key || !MayAddKeyFrame(*map, frame.camera_from_map)) return;
+  const auto is_starter = [map](const SystemCamera& camera) {
+    return camera.assignment.map() == map->key && camera.assignment.is_starting();
+  };
+  for (const SystemCamera& other : state_.cameras) {
+    if (is_starter(other) && other.is_connected) return;
+  }
+  if (mapping_.IsStarting(map->key)) return;
+  // Two cameras that search at the same time would both begin the map.
+  for (SystemCamera& other : state_.cameras) {
+    if (is_starter(other)) other.assignment.Enter(map->key);
+  }
+  assignment.GiveDepth();
 }
 
 // Handles a pose in a map that the cameras are no longer in: while the frame was tracked, another camera

@@ -51,6 +51,7 @@ class MapPolicy {
   void RejectPose(std::size_t index, TrackedFrame* frame);
   void CheckProvisionalMap(std::size_t index, const TrackedFrame& frame);
   void CheckLoss(std::size_t index, const TrackedFrame& frame);
+  void CheckDepth(std::size_t index, const TrackedFrame& frame);
   void EnterTrackedMap(std::size_t index, std::uint64_t key, Timestamp time);
   void LeavePreviousMap(std::uint64_t previous, std::uint64_t entered, Timestamp time);
   // Discards the map of this camera, and starts another one instead.

@@ -74,7 +74,7 @@ std::uint64_t MappingThread::Adopt(std::uint64_t key, std::shared_ptr<const MapS
 bool MappingThread::Start(std::uint64_t key, InitialPair pair) {
   {
     const std::scoped_lock lock(mutex_);
-    if (key != requested_key_) return false;
+    if (key != requested_key_ || starting_) return false;
     pair_ = std::move(pair);
     starting_ = has_work_ = true;
   }

@@ -104,6 +104,8 @@ CameraPlaceFinder System::ApplyOrder(std::size_t index, Timestamp time) {
     tracker.StartNewMap(/*search_known_maps=*/true);
   } else if (order == Order::kStartAgain) {
     tracker.StartFailed();
+  } else if (order == Order::kGiveDepth) {
+    tracker.InitializeTrackedMap();
   } else if (order != Order::kNone) {
     tracker.Reset();
   }

@@ -41,6 +41,8 @@ class MapInitialization {
   void Begin();
   // Discards the search.
   void Stop();
+  // The search begins again with the next image.
+  void ForgetViews() { ResetViews(); }
   // The mapper made a map of the pair.
   void Finish() { phase_ = Phase::kOff; }
   // The mapper could not make a map of the pair, or refused it: the search continues.

@@ -64,8 +64,15 @@ void Tracker::Reset() {
 void Tracker::StartNewMap(bool search_known_maps) {
   Reset();
   initialization_.Begin();
+  initializes_stored_map_ = false;
   state_ = CameraState::kStarting;
   search_known_maps_ = search_known_maps;
+}
+
+void Tracker::InitializeTrackedMap() {
+  if (!map_ || map_->HasFinitePoints() || !IsTracked(state_) || initialization_.is_on()) return;
+  initialization_.Begin();
+  initializes_stored_map_ = true;
 }
 
 void Tracker::SetMap(std::shared_ptr<const MapSnapshot> map, std::uint64_t map_key) {
@@ -107,6 +114,8 @@ void Tracker::SetMap(std::shared_ptr<const MapSnapshot> map, std::uint64_t map_k
     confirmation_.EnterOtherMap();
     state_ = CameraState::kLost;
     relocalizer_.LoseLongAgo();
+  } else if (initialization_.is_on()) {
+    initialization_.Stop();  // another camera gave the map its depth
   }
 }
 
@@ -148,7 +157,12 @@ void Tracker::Track(const Frame& frame, const PlaceFinder* places, TrackedFrame*
       SearchLost(frame, places, out);
       break;
   }
-  if (initialization_.is_on() && map_) SearchInitialPair(out);
+  // Another place that looks alike must not give a map that was there before its depth.
+  if (initializes_stored_map_ && confirmation_.is_pending()) {
+    initialization_.ForgetViews();
+  } else if (initialization_.is_on() && map_) {
+    SearchInitialPair(out);
+  }
   out->tracking_time = std::chrono::steady_clock::now() - start;
 }
 

@@ -68,6 +68,9 @@ class Tracker {
   void StartNewMap(bool search_known_maps = false);
   // The mapper could not make a map from the first view or the initial pair: the initialization continues.
   void StartFailed() { initialization_.PairFailed(); }
+  // Starts the initialization of the map without finite points that the camera is tracked in; nothing if it
+  // is not tracked in such a map.
+  void InitializeTrackedMap();
   CameraState state() const { return state_; }
 
   // Processes one frame. `places` may be null: then a lost camera is searched in its own map only.
@@ -125,7 +128,8 @@ class Tracker {
   std::shared_ptr<const MapSnapshot> map_;
   std::uint64_t map_key_ = 0;
   bool search_known_maps_ = false;
-  CameraImage image_;  // the last one
+  bool initializes_stored_map_ = false;  // and no new one, if the initialization is on
+  CameraImage image_;                    // the last one
   std::optional<TrackedCorners> corners_;
   bool searched_ = false;  // whether a map was searched in it
 };

@@ -39,6 +39,17 @@ TEST(MapAssignment, IsStartingUntilTheMapHasFinitePoints) {
   EXPECT_FALSE(assignment.is_starting());
 }
 
+TEST(MapAssignment, IsStartingWhileItGivesDepthToAMapThatWasEntered) {
+  MapAssignment assignment;
+  assignment.Enter(3);
+  assignment.TakeOrder(kNoDepth);
+  assignment.GiveDepth();
+  EXPECT_EQ(assignment.TakeOrder(kNoDepth), Order::kGiveDepth);
+  EXPECT_TRUE(assignment.is_starting());
+  assignment.Follow(4);
+  EXPECT_FALSE(assignment.is_starting()) << "it is in another map";
+}
+
 TEST(MapAssignment, StopsStartingWhenTheCameraLeavesOrEnters) {
   for (const bool leaves : {true, false}) {
     MapAssignment assignment;

@@ -91,6 +91,27 @@ class PolicyForTwoCameras : public ::testing::Test {
   MapPolicy policy_{options_, &state_, &calibrations_, &index_, &mapping_};
 };
 
+TEST_F(PolicyForTwoCameras, LetsOneTrackedCameraGiveDepthToAMapThatWasEntered) {
+  EnterMapWithoutDepth(1);
+  Handle(0, 1.0, TrackingState::kPanorama, 1);
+  EXPECT_EQ(NextOrder(0), Order::kGiveDepth);
+  Handle(1, 1.0, TrackingState::kPanorama, 1);
+  EXPECT_EQ(NextOrder(1), Order::kNone) << "the other camera does";
+  Handle(0, 1.1, TrackingState::kPanorama, 1);
+  EXPECT_EQ(NextOrder(0), Order::kNone) << "it does so already";
+  policy_.Disconnect(0);
+  Handle(1, 1.2, TrackingState::kPanorama, 1);
+  EXPECT_EQ(NextOrder(1), Order::kGiveDepth);
+  EXPECT_EQ(NextOrder(0), Order::kEnter) << "when it is back";
+}
+
+TEST_F(PolicyForTwoCameras, GivesNoDepthToAMapThatMayNotBeExtended) {
+  EnterMapWithoutDepth(1);
+  MapOf(1).permissions.extend = false;
+  Handle(0, 1.0, TrackingState::kPanorama, 1);
+  EXPECT_EQ(NextOrder(0), Order::kNone);
+}
+
 TEST_F(PolicyForTwoCameras, ReplacesAMapWithoutDepthThatACameraStarted) {
   policy_.StartMap(1, 1, false);
   for (const std::size_t camera : {0, 1}) NextOrder(camera);
