@@ -135,6 +135,15 @@ void Tracker::Track(const Frame& frame, const PlaceFinder* places, TrackedFrame*
   initialization_.BeginFrame();
   offers_.BeginFrame();
   odometry_.BeginFrame();
+  // After an interruption the camera may be anywhere.
+  if ((IsTracked(state_) || odometry_.is_active()) &&
+      frame.time - image_.time > FromSeconds(options_.short_loss_s)) {
+    pose_.Lose(frame.time);
+    odometry_.Reset();
+    relocalizer_.Lose(frame.time);
+    relocalizer_.LoseLongAgo();
+    state_ = CameraState::kLost;
+  }
   image_.time = frame.time;
   image_.camera = camera_;
   image_.previous = std::exchange(image_.features, nullptr);

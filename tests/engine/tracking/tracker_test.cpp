@@ -307,6 +307,26 @@ TEST(Tracker, IsLostAsSoonAsTheImageShowsAnotherPlace) {
   }
 }
 
+// A device that was suspended, or whose camera was unplugged, may have been carried elsewhere.
+TEST(Tracker, IsLostAfterAnInterruptionUntilThePlaceIsRecognized) {
+  const TrackedWalk& walk = OneWalk();
+  ASSERT_NE(walk.map, nullptr);
+  SomeMaps places;
+  places.Add(9, walk.map);
+  for (const double seconds : {1.0, 3.0}) {
+    Tracker tracker({}, Camera(), 3);
+    tracker.SetMap(walk.map, 9);
+    TrackedFrame tracked;
+    for (int i = 40; i < 55; ++i) tracked = tracker.Track(WalkFrame(i), &places);
+    ASSERT_EQ(tracked.state, TrackingState::kSixDof);
+    Frame frame = WalkFrame(55);
+    frame.time += FromSeconds(seconds);
+    EXPECT_EQ(tracker.Track(frame, &places).state,
+              seconds < 2 ? TrackingState::kSixDof : TrackingState::kRelocalized);
+    EXPECT_FALSE(seconds > 2 && tracker.TakeKeyFrameCandidate());
+  }
+}
+
 TEST(Tracker, DoesNotRelocalizeInAMapOfAnotherPlace) {
   const TrackedWalk& walk = OneWalk();
   ASSERT_NE(walk.map, nullptr);
