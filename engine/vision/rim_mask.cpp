@@ -21,6 +21,7 @@ std::optional<std::string> RimMaskOptions::Validate() const {
       .Within(max_black, 0, 255, "black level of a rim")
       .Within(max_above_black, 0, 255, "noise of a rim")
       .Ratio(max_bright_ratio, "ratio of bright images of a rim")
+      .Ratio(min_bright_ratio, "ratio of bright pixels of an image that shows a rim")
       .AtLeast(min_images, 1, "number of images of a rim")
       .AtLeast(images_per_update, 1, "number of images between two updates of a rim")
       .Ratio(min_ratio, "ratio of the image outside its circle")
@@ -41,13 +42,22 @@ void RimMask::Add(const ImageFeatures& features) {
     distance_.assign(pixels, 0);
     queue_.assign(pixels, 0);
   }
-  ++images_;
   // The black level of the image: the brightest of its four corners.
   const int last_column = columns_ - 1, last_row = rows_ - 1;
   const int black =
       std::max({image.at<std::uint8_t>(0, 0), image.at<std::uint8_t>(0, last_column),
                 image.at<std::uint8_t>(last_row, 0), image.at<std::uint8_t>(last_row, last_column)});
   const int limit = std::min(black, options_.max_black) + options_.max_above_black;
+  // An image of a covered lens or of a dark room shows no image circle. Many of them would make a rim of
+  // whatever is dark in the images that follow.
+  std::size_t bright = 0;
+  for (int row = 0; row < rows_; ++row) {
+    const std::uint8_t* const pixels = image.ptr<std::uint8_t>(row);
+    bright += static_cast<std::size_t>(
+        std::count_if(pixels, pixels + columns_, [limit](std::uint8_t pixel) { return pixel > limit; }));
+  }
+  if (static_cast<double>(bright) < options_.min_bright_ratio * static_cast<double>(bright_.size())) return;
+  ++images_;
   std::size_t at = 0;
   for (int row = 0; row < rows_; ++row) {
     const std::uint8_t* const pixels = image.ptr<std::uint8_t>(row);

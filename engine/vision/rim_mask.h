@@ -20,6 +20,9 @@ struct RimMaskOptions {
   int max_above_black = 12;  // noise, compression, and scattered light
   // The largest share of images in which a pixel of the rim is brighter, because a lamp flares.
   double max_bright_ratio = 0.05;
+  // An image with a smaller share of brighter pixels is too dark to show the image circle. The circle of a
+  // fisheye lens fills half of a sensor, and half of that may be dark.
+  double min_bright_ratio = 0.25;
   int min_images = 20;  // before the mask is used
   int images_per_update = 20;
   // The least share of the image outside the circle. A vignette that does not reach black stays below it.

@@ -60,6 +60,17 @@ TEST(RimMask, IsNotUsedBeforeEnoughImages) {
   EXPECT_FALSE(MaskOf(kDiscRadius, 19).found());
 }
 
+TEST(RimMask, IsNotMadeOfWhatIsDarkAfterTheLensWasCovered) {
+  RimMask mask;
+  const auto covered = MakeFeatures(DiscImage(1, 0));
+  for (int i = 0; i < 1000; ++i) mask.Add(*covered);
+  EXPECT_FALSE(mask.found());
+  // The edges of a scene are dark in three of four images.
+  for (int i = 0; i < 200; ++i)
+    mask.Add(*MakeFeatures(DiscImage(static_cast<std::uint64_t>(i) + 1, i % 4 == 0 ? 1000 : kDiscRadius)));
+  EXPECT_FALSE(mask.found());
+}
+
 TEST(RimMask, ABrightSurroundingIsNoRim) {
   EXPECT_FALSE(MaskOf(kDiscRadius, 20, 60).found());
 }
