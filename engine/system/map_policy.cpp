@@ -205,7 +205,8 @@ bool MapPolicy::MayAddKeyFrame(const KnownMap& map, const Rigid3& camera_from_ma
 
 void MapPolicy::HandleMapperEvent(const MapperEvent& event, KnownMap* map) {
   if (std::holds_alternative<MapperEvent::MapStarted>(event.what)) {
-    map->provisional.Begin(event.time);
+    // The time of the check begins with the map: the mapper may have needed long for it.
+    map->provisional.Begin(std::max(event.time, state_.LastTime()));
     for (std::size_t i = 0; i < state_.cameras.size(); ++i) {
       const SystemCamera& camera = state_.cameras[i];
       if (camera.assignment.map() != map->key || !camera.assignment.is_starting()) continue;

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "engine/system/provisional_map.h"
 
+#include <algorithm>
+
 #include "engine/base/option_check.h"
 
 namespace docent::engine {
@@ -17,7 +19,13 @@ std::optional<std::string> ProvisionalMapOptions::Validate() const {
 void ProvisionalMap::Begin(Timestamp started) {
   pending_ = is_young_ = true;
   started_ = started;
-  monitor_ = InitializationMonitor();
+  monitors_.clear();
+}
+
+InitializationMonitor& ProvisionalMap::MonitorOf(int camera) {
+  const auto index = static_cast<std::size_t>(camera);
+  if (index >= monitors_.size()) monitors_.resize(index + 1);
+  return monitors_[index];
 }
 
 std::optional<MapDiscarded> ProvisionalMap::Check(const ProvisionalMapOptions& options,
@@ -39,9 +47,10 @@ std::optional<MapDiscarded> ProvisionalMap::Check(const ProvisionalMapOptions& o
   }
   if (now - started_ > options.time) is_young_ = false;
   if (!pending_ && !is_young_) return std::nullopt;
-  if (seen.in_map) monitor_.Add(seen.frame);
-  auto fault = is_young_ ? monitor_.FindJump() : std::nullopt;
-  if (!fault && pending_) fault = monitor_.FindFault();
+  InitializationMonitor& monitor = MonitorOf(seen.frame.frame.camera);
+  if (seen.in_map) monitor.Add(seen.frame);
+  auto fault = is_young_ ? monitor.FindJump() : std::nullopt;
+  if (!fault && pending_) fault = monitor.FindFault();
   if (fault && seen.may_discard) {
     reason.reason = MapDiscarded::Reason::kFalseDepth;
     reason.fault = *fault;
@@ -52,13 +61,15 @@ std::optional<MapDiscarded> ProvisionalMap::Check(const ProvisionalMapOptions& o
     if (now - started_ > options.time || seen.map->keyframes.size() >= options.keyframes) pending_ = false;
     return std::nullopt;
   }
-  if (!is_lost_for(options.loss_time)) return std::nullopt;
+  // A loss while the mapper made the map does not count.
+  const Timestamp lost_since = std::max(*seen.lost_since, started_);
+  if (now - lost_since <= options.loss_time) return std::nullopt;
   if (!seen.may_discard) {
     pending_ = false;
     return std::nullopt;
   }
   reason.reason = MapDiscarded::Reason::kLostWhileProvisional;
-  reason.tracked_for = *seen.lost_since - started_;
+  reason.tracked_for = lost_since - started_;
   reason.keyframes = seen.map->keyframes.size();
   return reason;
 }

@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "engine/system/initialization_monitor.h"
 #include "engine/system/system_event.h"
@@ -31,7 +32,7 @@ struct ProvisionalMapOptions {
 // owner guards it.
 class ProvisionalMap {
  public:
-  // The mapper gave the map finite points. started: time of the frame that completed its initial pair.
+  // The mapper gave the map finite points. started: time of the last frame.
   void Begin(Timestamp started);
   // The map was confirmed by other means, or it is left.
   void End() { pending_ = is_young_ = false; }
@@ -51,10 +52,12 @@ class ProvisionalMap {
   std::optional<MapDiscarded> Check(const ProvisionalMapOptions& options, const Observation& seen);
 
  private:
+  InitializationMonitor& MonitorOf(int camera);
+
   bool pending_ = false;
   Timestamp started_{};
-  bool is_young_ = false;  // Begin was called, and its time has not passed.
-  InitializationMonitor monitor_;
+  bool is_young_ = false;                        // Begin was called, and its time has not passed.
+  std::vector<InitializationMonitor> monitors_;  // by camera: each sees another part of the map
 };
 
 }  // namespace docent::engine

@@ -19,8 +19,9 @@ class NewMap : public ::testing::Test {
     provisional_.Begin(FromSeconds(1));
   }
   // The camera is tracked with this inlier ratio.
-  std::optional<MapDiscarded> Track(double seconds, double quality = 0.8) {
+  std::optional<MapDiscarded> Track(double seconds, double quality = 0.8, int camera = 0) {
     TrackedFrame frame;
+    frame.frame.camera = camera;
     frame.frame.time = FromSeconds(seconds);
     frame.state = TrackingState::kSixDof;
     frame.map = map_;
@@ -55,6 +56,15 @@ class NewMap : public ::testing::Test {
   ProvisionalMap provisional_;
   bool may_discard_ = true;
 };
+
+TEST_F(NewMap, IsNotFalseBecauseAnotherCameraSeesLessOfIt) {
+  for (int i = 0; i < 8; ++i) EXPECT_FALSE(Track(1.05 + i / 30.0));
+  for (int i = 0; i < 20; ++i) EXPECT_FALSE(Track(1.35 + i / 30.0, 0.2, 1)) << i;
+  for (int i = 0; i < 20; ++i) {
+    if (Track(2.05 + i / 30.0, 0.2)) return;
+  }
+  ADD_FAILURE() << "the first camera lost most of its points";
+}
 
 TEST_F(NewMap, IsConfirmedByTime) {
   EXPECT_FALSE(Track(2.9));
