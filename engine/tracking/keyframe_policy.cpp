@@ -32,6 +32,7 @@ std::optional<std::string> KeyFramePolicyOptions::Validate() const {
       .AtLeast(few_points, 0, "number of few points")
       .AtLeast(min_view_ratio_when_few, 0, "angle between viewing directions when points are few")
       .AtLeast(few_points_without_rotation, 0, "number of few points without rotation")
+      .AtLeast(max_without_rotation, 0, "number of keyframes without rotation")
       .NotNegative(history, "history of poses")
       .NotNegative(open_timeout, "time to open a panorama map")
       .NotNegative(history_interval, "interval between poses of the history")
@@ -153,8 +154,14 @@ KeyFrameChoice KeyFramePolicy::Select(const PolicyFrame& frame, const MapSnapsho
   // In a map without finite points, few inliers mean that the camera has translated near the scene. A
   // keyframe then adds what is visible now, for any viewing direction. A map with finite points would only
   // gain drift from that.
-  if (frame.points < options_.few_points_without_rotation && !map.HasFinitePoints())
-    return KeyFrameChoice::kPanorama;
+  if (frame.points < options_.few_points_without_rotation && !map.HasFinitePoints()) {
+    const auto in_this_direction =
+        std::count_if(map.keyframes.begin(), map.keyframes.end(), [&](const KeyFrame& k) {
+          return k.panorama == open && AngleBetween(AxisOf(k.camera_from_map), now.axis) <=
+                                           options_.min_view_ratio_when_few * field_of_view_;
+        });
+    if (in_this_direction < options_.max_without_rotation) return KeyFrameChoice::kPanorama;
+  }
   const double ratio =
       frame.points < options_.few_points ? options_.min_view_ratio_when_few : options_.min_view_ratio;
   const bool is_new_direction =

@@ -34,6 +34,9 @@ struct KeyFramePolicyOptions {
   // With fewer inliers than this (half of few_points), a map without finite points gets a keyframe without
   // any rotation.
   int few_points_without_rotation = 30;
+  // But only up to this many keyframes in the same direction, those of five seconds. Leaves, water or a
+  // screen never stop changing, and each keyframe needs about 0.4 MB.
+  int max_without_rotation = 30;
   // Poses of this period are compared to tell pure rotation from translation.
   Timestamp history = std::chrono::seconds(10);
   // A panorama map that the mapper has not opened within this time after it accepted the keyframe is given

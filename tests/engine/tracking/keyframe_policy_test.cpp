@@ -218,6 +218,25 @@ TEST_F(KeyFramePolicyTest, OpensAPanoramaOnlyByARotationWithFewPointsIfBothAreNe
   EXPECT_EQ(choose(kViewTurnDeg + 0.1, 59), KeyFrameChoice::kLocalizedPanorama);
 }
 
+// What always moves, such as leaves or water, would fill the memory.
+TEST_F(KeyFramePolicyTest, AddsOnlySoManyKeyframesInOneDirectionOfAMapWithoutDepth) {
+  Open();
+  MapSnapshot map = OpenedMap();
+  const auto choose = [&](double seconds, double turn_deg) {
+    PolicyFrame frame = RotationOnly(seconds, RotatedBy(turn_deg));
+    frame.points = 20;
+    return policy_.Select(frame, map);
+  };
+  int added = 0;
+  for (double seconds = 2; choose(seconds, 20) == KeyFrameChoice::kPanorama; seconds += 0.2) {
+    map.keyframes.push_back(
+        Dependent(static_cast<KeyFrameId>(map.keyframes.size()), seconds, RotatedBy(20), 3));
+    ASSERT_LT(++added, 100);
+  }
+  EXPECT_EQ(added + 1, KeyFramePolicyOptions().max_without_rotation) << "one is there already";
+  EXPECT_EQ(choose(200, 30), KeyFrameChoice::kPanorama);
+}
+
 TEST_F(KeyFramePolicyTest, OffersNothingWhileAClosedPanoramaTracksTheCamera) {
   PolicyFrame frame = RotationOnly(2, RotatedBy(30));
   frame.needs_six_dof = true;
