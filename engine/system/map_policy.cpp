@@ -79,7 +79,7 @@ void MapPolicy::RejectPose(std::size_t index, TrackedFrame* frame) {
 
 void MapPolicy::Disconnect(std::size_t index) {
   SystemCamera& gone = state_.cameras.at(index);
-  gone.is_connected = false;
+  gone.is_connected = gone.has_odometry = false;
   state_.association.SetLost(index);
   const KnownMap* const map = state_.FindMap(gone.assignment.map());
   if (!gone.assignment.started_map() || map == nullptr || !map->Exists() || map->snapshot) return;

@@ -161,7 +161,12 @@ void System::ExtendCopy(std::size_t index) {
     const std::scoped_lock lock(mutex_);
     const KnownMap* const map = state_.FindMap(state_.cameras[index].assignment.map());
     const auto snapshot = map ? map->snapshot : nullptr;
-    if (state_.copy.number != 0 && (invalid || state_.copy.of != snapshot)) {
+    state_.cameras[index].has_odometry = tracker.HasOdometry();
+    // A camera that was relocalized does not take the copy away from one that depends on it.
+    state_.copy.invalid = state_.copy.invalid || invalid;
+    const bool needed = std::any_of(state_.cameras.begin(), state_.cameras.end(),
+                                    [](const SystemCamera& camera) { return camera.has_odometry; });
+    if (state_.copy.number != 0 && ((state_.copy.invalid && !needed) || state_.copy.of != snapshot)) {
       state_.copy = {};
       mapping_.Adopt(0, nullptr);
     }

@@ -28,7 +28,8 @@ struct SystemCamera {
   std::unique_ptr<CalibrationMonitor> calibration_monitor;
   MapAssignment assignment;
   Timestamp last_time{};
-  bool is_connected = true;  // delivers images
+  bool is_connected = true;   // delivers images
+  bool has_odometry = false;  // it is followed in the copy of the map
 };
 
 // A map that the system knows.
@@ -72,6 +73,7 @@ struct OdometryCopy {
   std::uint64_t number = 0;                     // the mapper's name for it; 0 for none
   std::shared_ptr<const MapSnapshot> of;        // the map as it is known
   std::shared_ptr<const MapSnapshot> extended;  // null before the first keyframe
+  bool invalid = false;  // a camera was relocalized: it is dropped once no camera depends on it
 };
 
 // What a System knows of its cameras and maps. The system's mutex guards all of it except the trackers.

@@ -58,6 +58,8 @@ class Tracker {
   // While maps are only viewed: the newest state of the copy of the tracked map that the mapper extends with
   // the keyframes of this tracker (VisualOdometry); null if there is none.
   void SetOdometryCopy(std::shared_ptr<const MapSnapshot> copy) { odometry_.SetCopy(std::move(copy)); }
+  // Whether the camera is followed in that copy.
+  bool HasOdometry() const { return odometry_.is_active(); }
   // True once after that copy became invalid.
   bool TakeInvalidOdometryCopy() { return odometry_.TakeInvalidCopy(); }
   // Discards the track and an initialization in progress.
@@ -66,11 +68,11 @@ class Tracker {
   // search_known_maps: the camera was lost in another map. While it is tracked in the new map, the others are
   // searched as well, and one that explains the image is entered as after a loss.
   void StartNewMap(bool search_known_maps = false);
-  // The mapper could not make a map from the first view or the initial pair: the initialization continues.
-  void StartFailed() { initialization_.PairFailed(); }
   // Starts the initialization of the map without finite points that the camera is tracked in; nothing if it
   // is not tracked in such a map.
   void InitializeTrackedMap();
+  // The mapper could not make a map from the first view or the initial pair: the initialization continues.
+  void StartFailed() { initialization_.PairFailed(); }
   CameraState state() const { return state_; }
 
   // Processes one frame. `places` may be null: then a lost camera is searched in its own map only.

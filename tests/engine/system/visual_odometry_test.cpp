@@ -143,6 +143,29 @@ TEST_F(VisualOdometryTest, ContinuesTheRotationOfAVisitorWhoTurnsOnTheSpot) {
   EXPECT_FALSE(last_.by_odometry);
 }
 
+// Two cameras of one visitor share the copy of the map.
+TEST(VisualOdometryOfTwoCameras, GoesOnWhenTheOtherCameraIsRecognizedInTheMap) {
+  SystemOptions options;
+  options.threaded = false;
+  options.extend_maps = false;
+  System system(options, std::vector{Camera(), Camera()});
+  system.AddMap(1, BeginningOfTheWall(), MapPermissions());
+  system.place_index().SetMap(1, BeginningOfTheWall());
+  constexpr int kOdometry = 130, kBack = 135, kEnd = 160;
+  int recognized = 0;
+  for (int i = 0; i < kEnd; ++i) {
+    const TrackedFrame first = system.Process(testing_world::MakeFrame(i, LongWall(), PoseOf(i)));
+    Frame frame = i < kBack ? testing_world::MakeFrame(
+                                  i, cv::Mat::zeros(Camera()->height_px(), Camera()->width_px(), CV_8UC1))
+                            : testing_world::MakeFrame(i, LongWall(), PoseOf(20));
+    frame.camera = 1;
+    recognized += HasPose(system.Process(frame).state);
+    if (i < kOdometry) continue;
+    EXPECT_TRUE(HasPose(first.state) && first.by_odometry) << i;
+  }
+  EXPECT_GT(recognized, 10);
+}
+
 class ShortVisualOdometry : public VisualOdometryTest {
  protected:
   ShortVisualOdometry() : VisualOdometryTest(/*max_odometry_s=*/0.5) {}
