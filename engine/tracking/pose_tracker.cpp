@@ -259,7 +259,7 @@ PoseTracker::Estimate PoseTracker::Track(const MapSnapshot& map, const CameraIma
   }
   SearchPanoramaAt(predicted, map, policy);
   map_tracker_.SetPivot(pivot_estimate_);
-  ExpectPosition(image.time);
+  ExpectPosition(image.is_repeated ? motion_.time() : image.time);
   MapTrackResult result = TrackFromPrediction(map, image, predicted, random);
   if (!criteria_.IsAccepted(result, comparison_)) {
     map_tracker_.SetPredictedCenter(std::nullopt);
@@ -345,6 +345,7 @@ void PoseTracker::UpdateDrift(double seconds) {
 }
 
 void PoseTracker::UpdatePosition(const CameraImage& image, const MapTrackResult& result) {
+  if (image.is_repeated) return;  // It measures nothing new.
   const double sigma = options_.map_tracker.refinement.common_error_factor *
                        std::sqrt(result.covariance.topLeftCorner<3, 3>().trace());
   const bool from_points = result.observed != ObservedMotion::kPanorama && result.finite_inliers > 0;
