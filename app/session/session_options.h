@@ -37,7 +37,7 @@ struct SessionOptions : engine::SystemOptions {
   double model_side = 0.2;        // the same for the largest side of a model without a scale
   maps::PagerOptions memory;      // how much of the library is in memory at once
   // Measured distance in metres between the first two cameras of a rigid rig; 0 when not measured. Once the
-  // rig is recognized, it gives the length of a map unit in metres.
+  // rig is recognized, a map without a scale gets its scale from it.
   double baseline_m = 0;
 };
 

@@ -11,6 +11,7 @@
 #include "app/files/text_file.h"
 #include "app/output/engine_text.h"
 #include "app/session/joined_scenes.h"
+#include "content/map_settings.h"
 #include "maps/library/signposts.h"
 
 namespace docent::app {
@@ -171,7 +172,9 @@ void SystemEventHandler::Handle(const engine::SystemEvent& event, const engine::
 void SystemEventHandler::Handle(const engine::SystemEvent& event, const engine::RigChanged& what) {
   std::string detail = state_.NameOf(event.map) + ": " + TextOf(what.estimate);
   if (what.estimate.rigid && options_.baseline_m > 0) {
-    detail += ", one map unit is " + FormatNumber(options_.baseline_m / what.estimate.Baseline(), 4) + " m";
+    const double metres_per_unit = options_.baseline_m / what.estimate.Baseline();
+    detail += ", one map unit is " + FormatNumber(metres_per_unit, 4) + " m";
+    AddScale(event.map, metres_per_unit);
   }
   state_.AddEvent(event.time, "rig", detail);
 }
@@ -210,6 +213,9 @@ void SystemEventHandler::Handle(const engine::SystemEvent& event, const engine::
   if (!text) return;
   state_.AddEvent(event.time, text->event, text->detail);
   if (!std::holds_alternative<engine::MapperEvent::CalibrationContradicted>(what.what)) return;
+  // A map that is initialized from a target is in metres.
+  if (options_.tracker.target && std::holds_alternative<engine::MapperEvent::MapStarted>(what.what))
+    AddScale(event.map, 1);
   for (std::size_t i = 0; i < state_.cameras.size(); ++i) {
     if (!system_.EstimatedLensOf(i)) state_.cameras[i].Advise(text->detail);
   }
@@ -218,6 +224,19 @@ void SystemEventHandler::Handle(const engine::SystemEvent& event, const engine::
 // `into` already has the joined snapshot. Edits in `from` can no longer be undone, as its content was moved.
 void SystemEventHandler::AbsorbMap(SessionMap* from, const engine::JoinedMap& joined, SessionMap* into) {
   auto scene = std::make_shared<content::Scene>(*into->scene);
+void SystemEventHandler::AddScale(std::uint64_t key, double metres_per_unit) {
+  SessionMap* const map = state_.FindMap(key);
+  if (!options_.may_write || map == nullptr || !map->Exists() || !maps::MayChangeContent(map->policy)) return;
+  if (map->scene->settings.metres_per_unit != 0) return;
+  content::MapSettings gained;
+  gained.metres_per_unit = metres_per_unit;
+  if (!content::Validate(gained).empty()) return;
+  auto scene = std::make_shared<content::Scene>(*map->scene);
+  scene->settings.metres_per_unit = metres_per_unit;
+  map->history.AddSettings(gained);
+  map->Follow(std::move(scene));
+}
+
   const maps::MapInfo map_into = IdentityOf(*into), map_from = IdentityOf(*from);
   MergeScene(*from->scene, map_into, map_from, joined, into->history.Names(), scene.get());
   content::MapSettings gained = scene->settings;

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <cstdint>
+
 #include "app/session/session_memory.h"
 #include "app/session/session_options.h"
 #include "app/session/session_saving.h"
@@ -43,6 +45,9 @@ class SystemEventHandler {
   void Handle(const engine::SystemEvent& event, const engine::LensEstimated& what);
   void Handle(const engine::SystemEvent& event, const engine::MapperFailed& what);
   void Handle(const engine::SystemEvent& event, const engine::MapperEvent& what);
+  // Stores the scale of a map that was determined otherwise than by an author, unless the map has one
+  // already.
+  void AddScale(std::uint64_t key, double metres_per_unit);
   void AbsorbMap(SessionMap* from, const engine::JoinedMap& joined, SessionMap* into);
 
   const SessionOptions& options_;

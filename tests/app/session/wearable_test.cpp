@@ -47,12 +47,14 @@ struct WalkOfTwoCameras {
 };
 
 // Feeds both views of a walk to one session that builds a map.
-WalkOfTwoCameras Take(const std::string& hand, const std::string& shoulder, double seconds, Pace pace) {
+WalkOfTwoCameras Take(const std::string& hand, const std::string& shoulder, double seconds, Pace pace,
+                      double baseline_m = 0) {
   CalibratedCamera cameras[2] = {Calibrate(OpenSimulation(View(hand, seconds)), std::nullopt),
                                  Calibrate(OpenSimulation(View(shoulder, seconds)), std::nullopt)};
   SessionOptions options;
   options.threaded = pace != Pace::kLockstep;
   options.first_map = "table";
+  options.baseline_m = baseline_m;
   Session session(options, {cameras[0].model, cameras[1].model}, nullptr);
   WalkOfTwoCameras walk;
   std::vector<CameraRun> runs(2);
@@ -127,11 +129,11 @@ TEST(Wearable, BuildsOneMapWithBothCamerasAndEachTracksWhatTheOtherMapped) {
       << "these cameras move relative to each other: " << TextOf(*walk.rig);
 }
 
-TEST(Wearable, RecognizesThatItsCamerasAreRigidlyConnected) {
-  const WalkOfTwoCameras walk = Take("hand:1", "shoulder:1", 16, Pace::kLockstep);
+TEST(Wearable, RecognizesThatItsCamerasAreRigidlyConnectedAndGivesTheMapItsScale) {
+  const engine::Rigid3 truth = WearableRig().inverse();  // shoulder_from_hand
+  const WalkOfTwoCameras walk = Take("hand:1", "shoulder:1", 16, Pace::kLockstep, truth.translation.norm());
   ASSERT_TRUE(walk.rig);
   EXPECT_TRUE(walk.rig->rigid) << TextOf(*walk.rig);
-  const engine::Rigid3 truth = WearableRig().inverse();  // shoulder_from_hand
   const double turn_deg =
       (walk.rig->second_from_first.rotation.inverse() * truth.rotation).Angle() * 57.29578;
   RecordProperty("turn_off_deg", std::to_string(turn_deg));
@@ -159,6 +161,9 @@ TEST(Wearable, RecognizesThatItsCamerasAreRigidlyConnected) {
   EXPECT_NEAR(baseline_m, truth.translation.norm(), 0.01 * truth.translation.norm());
   EXPECT_TRUE(std::any_of(walk.events.begin(), walk.events.end(),
                           [](const Event& event) { return event.event == "rig"; }));
+  ASSERT_FALSE(walk.maps.empty());
+  const double metres_per_unit = in_world / in_map;
+  EXPECT_NEAR(walk.maps.back().scene->settings.metres_per_unit, metres_per_unit, 0.02 * metres_per_unit);
 }
 
 // Maps the beginning of a scene and saves it in a library.
