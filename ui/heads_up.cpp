@@ -25,15 +25,15 @@ const char* StateText(TrackingState state) {
     case TrackingState::kSixDof:
       return "Tracking";
     case TrackingState::kHybrid:
-      return "Tracking with distant points";
+      return "Tracking";
     case TrackingState::kPanorama:
-      return "Tracking rotation only";
+      return "Tracking the direction only";
     case TrackingState::kLost:
       return "Lost";
     case TrackingState::kRelocalized:
-      return "Relocalized";
+      return "Place recognized";
     case TrackingState::kDropped:
-      return "Frame skipped";
+      return "Image skipped";
   }
   return "";
 }

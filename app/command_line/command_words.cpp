@@ -31,7 +31,7 @@ struct DoneWriter {
   std::string operator()(const JoinMap& c) const { return "Comparing the map " + c.name + " with this one…"; }
   std::string operator()(const SetMapUp& c) const {
     return c.pixel ? "This surface is now the ground of the map."
-                   : "The up direction is now estimated from the keyframes.";
+                   : "The up direction is now estimated from how the camera was held.";
   }
   std::string operator()(const SetMapScale& c) const {
     return c.length_m > 0 ? "The map now has a scale: models are placed at their true size."

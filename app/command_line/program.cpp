@@ -115,8 +115,8 @@ CLI::App* AddSubcommand(CLI::App* parent, const std::string& name, const std::st
 
 int RunProgram(int argc, const char* const* argv) {
   CLI::App program(
-      "Docent, an augmented-reality guide: it builds maps, recognizes them later, and shows the models and "
-      "signposts placed in them.",
+      "Docent, an augmented-reality guide: it builds maps, recognizes them later, and shows what was "
+      "placed in them.",
       "docent");
   program.footer(ProgramFooter());
   program.require_subcommand(1);

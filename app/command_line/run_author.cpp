@@ -172,7 +172,7 @@ void RunTour(const TourOptions& options, Verbosity verbosity) {
   RunGuide(request, cameras, verbosity);
   if (verbosity == Verbosity::kQuiet) return;
   const std::size_t maps = library.List().size();
-  std::printf("%llu of %llu frames localized; the library has %zu %s\n",
+  std::printf("%llu of %llu images have a pose; the library has %zu %s\n",
               static_cast<unsigned long long>(localized), static_cast<unsigned long long>(frames), maps,
               maps == 1 ? "map" : "maps");
 }

@@ -180,7 +180,7 @@ void PrintSummary(const DrawingCheck& check, std::size_t maps, const fs::path& f
               percent(check.recognized_correctly()), check.visit_frames(),
               percent(check.recognized() - check.recognized_correctly()));
   if (!check.errors_px().empty()) {
-    std::printf("Typical placement error: %s pixels; 95 %% of %zu drawings are within %s pixels.\n",
+    std::printf("Median placement error: %s pixels; 95 %% of %zu drawn objects are within %s pixels.\n",
                 FormatNumber(Quantile(check.errors_px(), 0.5), 3).c_str(), check.errors_px().size(),
                 FormatNumber(Quantile(check.errors_px(), 0.95), 3).c_str());
   }

@@ -166,7 +166,7 @@ std::string TextOf(engine::Hint hint) {
     case Hint::kLowTexture:
       return "Little detail is in view: turn towards the exhibit.";
     case Hint::kLeftMap:
-      return "You have left the mapped area: look back.";
+      return "You have left the known area: look back.";
     case Hint::kLookBack:
       return "Look back at a place you have seen before.";
     case Hint::kFollowOtherCamera:
@@ -218,6 +218,30 @@ std::string TextOf(engine::JoinRefusal refusal, const engine::MapOverlap& overla
       return "the joining was interrupted";
   }
   return {};
+}
+
+std::string TextForAuthors(engine::JoinRefusal refusal, const engine::MapOverlap& overlap) {
+  using engine::JoinRefusal;
+  using Outcome = engine::MapOverlap::Outcome;
+  if (refusal == JoinRefusal::kTooManyIds) return "together they are too large for one map";
+  if (refusal == JoinRefusal::kTooMuchDrift) return "one of them is too inaccurate to fit the other";
+  if (refusal != JoinRefusal::kNoOverlap) return TextOf(refusal, overlap);
+  switch (overlap.outcome) {
+    case Outcome::kNothingToCompare:
+      return "one of them shows too little to be compared";
+    case Outcome::kTooFewConsecutive:
+      return "too few views of one are recognized in the other";
+    case Outcome::kTooFewConfirmed:
+    case Outcome::kTooFewPoints:
+    case Outcome::kSurfacesDiffer:
+      return "they look alike, but differ in too many places";
+    case Outcome::kOverlap:
+    case Outcome::kNothingRecognized:
+    case Outcome::kAmbiguous:
+    case Outcome::kInterrupted:
+      break;
+  }
+  return TextOf(refusal, overlap);
 }
 
 std::optional<EventText> TextOf(const engine::MapperEvent& event, const std::string& map_name) {

@@ -28,6 +28,8 @@ std::string TextOf(const engine::CalibrationContradiction& contradiction);
 std::string FormatFocalLength(const engine::EstimatedLens& lens);
 // Why two maps were not joined: one sentence without full stop. `overlap` belongs to the same attempt.
 std::string TextOf(engine::JoinRefusal refusal, const engine::MapOverlap& overlap);
+// The same for a person who builds maps, without figures.
+std::string TextForAuthors(engine::JoinRefusal refusal, const engine::MapOverlap& overlap);
 
 // The two columns of events.csv for an action of the mapper in the map of this name; empty for actions that
 // are not reported.

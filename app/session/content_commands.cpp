@@ -53,7 +53,7 @@ SessionMap& ContentCommands::MapToEdit(const engine::TrackedFrame& frame) {
     throw Error("there is no current map; start one, or point the camera at a place of a map");
   if (map->discarded)
     throw Error("the map of this image was discarded; make the change in the map that is current now");
-  if (!map->Exists()) throw Error("the map of this frame was joined into another one");
+  if (!map->Exists()) throw Error("the map of this image was joined into another one");
   if (!maps::MayChangeContent(map->policy)) {
     throw Error(map->PolicyInWords() + "; its content cannot be changed");
   }
@@ -226,7 +226,7 @@ void ContentCommands::Apply(const SetSignpostDirection& command, const engine::T
   std::optional<Eigen::Vector3d> direction = command.direction;
   if (command.ahead) {
     if (!engine::HasPose(frame.state))
-      throw Error("the camera has no pose, so that its viewing direction is not known");
+      throw Error("the camera is lost, so that the direction in which it looks is not known");
     direction = frame.camera_from_map.rotation.inverse() * Eigen::Vector3d::UnitZ();
   }
   Edit(&map, content::DirectionEdit(*map.scene, command.name, direction));
@@ -318,7 +318,7 @@ void ContentCommands::Apply(const SetMapEntrance& command, const engine::Tracked
   if (command.here) {
     if (!engine::HasPose(frame.state)) throw Error("the camera is not tracked in a map");
     settings.entrance = MostSimilarKeyFrame(*frame.map, frame.camera_from_map);
-    if (!settings.entrance) throw Error("the map has no keyframe yet");
+    if (!settings.entrance) throw Error("the map has no view yet");
   }
   Edit(&map, content::SettingsEdit(*map.scene, settings, "choose the entrance view"));
 }

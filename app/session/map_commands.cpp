@@ -126,7 +126,8 @@ void MapCommands::Apply(const JoinMap& command, const engine::TrackedFrame& fram
   }
   // The current map may still get depth, and is compared then.
   if (!from.snapshot->HasFinitePoints())
-    throw Error("the map '" + from.name + "' has no depth yet and cannot be joined");
+    throw Error("the map '" + from.name +
+                "' has no depth yet and cannot be joined; move the camera sideways in it first");
   if (system_.ActiveMap() != into->key)
     throw Error("the map '" + into->name + "' is not being extended; continue it first");
   system_.JoinIntoActiveMap(from.key);

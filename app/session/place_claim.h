@@ -9,8 +9,8 @@
 namespace docent::app {
 
 // Decides whether a visitor may be told where they are: only while content is drawn where it belongs. Before
-// a bare floor a camera is followed by its rotation alone, so that content would walk along with the visitor.
-// Times are those of the images, in seconds, and do not decrease. One thread.
+// a floor of low texture a camera is followed by its rotation alone, so that content would walk along with
+// the visitor. Times are those of the images, in seconds, and do not decrease. One thread.
 class PlaceClaim {
  public:
   // A frame at this time.

@@ -81,7 +81,8 @@ SessionMap* SessionState::FindByName(const std::string& name) {
 SessionMap& SessionState::InitializedMap(const std::string& name) {
   SessionMap* const map = FindByName(name);
   if (map == nullptr) throw Error("there is no map '" + name + "'");
-  if (!map->snapshot) throw Error("the map '" + name + "' is not initialized yet");
+  if (!map->snapshot)
+    throw Error("the map '" + name + "' has only just been started; move the camera sideways first");
   return *map;
 }
 

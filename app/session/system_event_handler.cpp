@@ -162,11 +162,12 @@ void SystemEventHandler::Handle(const engine::SystemEvent& event, const engine::
 }
 
 void SystemEventHandler::Handle(const engine::SystemEvent& event, const engine::JoinRefused& what) {
-  const std::string sentence = "maps " + state_.NameOf(event.map) + " and " + state_.NameOf(what.from) +
-                               " were not joined: " + TextOf(what.refusal, what.overlap);
-  state_.AddEvent(event.time, "map", sentence);
+  const std::string sentence =
+      "maps " + state_.NameOf(event.map) + " and " + state_.NameOf(what.from) + " were not joined: ";
+  state_.AddEvent(event.time, "map", sentence + TextOf(what.refusal, what.overlap));
   if (!what.asked) return;
-  for (SessionCamera& camera : state_.cameras) camera.Advise(sentence);
+  for (SessionCamera& camera : state_.cameras)
+    camera.Advise(sentence + TextForAuthors(what.refusal, what.overlap));
 }
 
 void SystemEventHandler::Handle(const engine::SystemEvent& event, const engine::RigChanged& what) {
@@ -212,18 +213,17 @@ void SystemEventHandler::Handle(const engine::SystemEvent& event, const engine::
   const std::optional<EventText> text = TextOf(what, state_.NameOf(event.map));
   if (!text) return;
   state_.AddEvent(event.time, text->event, text->detail);
-  if (!std::holds_alternative<engine::MapperEvent::CalibrationContradicted>(what.what)) return;
   // A map that is initialized from a target is in metres.
   if (options_.tracker.target && std::holds_alternative<engine::MapperEvent::MapStarted>(what.what))
     AddScale(event.map, 1);
+  if (!std::holds_alternative<engine::MapperEvent::CalibrationContradicted>(what.what)) return;
   for (std::size_t i = 0; i < state_.cameras.size(); ++i) {
-    if (!system_.EstimatedLensOf(i)) state_.cameras[i].Advise(text->detail);
+    if (system_.EstimatedLensOf(i)) continue;
+    state_.cameras[i].Advise(
+        "The calibration of this camera is probably wrong. Calibrate it with `docent calibrate`.");
   }
 }
 
-// `into` already has the joined snapshot. Edits in `from` can no longer be undone, as its content was moved.
-void SystemEventHandler::AbsorbMap(SessionMap* from, const engine::JoinedMap& joined, SessionMap* into) {
-  auto scene = std::make_shared<content::Scene>(*into->scene);
 void SystemEventHandler::AddScale(std::uint64_t key, double metres_per_unit) {
   SessionMap* const map = state_.FindMap(key);
   if (!options_.may_write || map == nullptr || !map->Exists() || !maps::MayChangeContent(map->policy)) return;
@@ -237,6 +237,9 @@ void SystemEventHandler::AddScale(std::uint64_t key, double metres_per_unit) {
   map->Follow(std::move(scene));
 }
 
+// `into` already has the joined snapshot. Edits in `from` can no longer be undone, as its content was moved.
+void SystemEventHandler::AbsorbMap(SessionMap* from, const engine::JoinedMap& joined, SessionMap* into) {
+  auto scene = std::make_shared<content::Scene>(*into->scene);
   const maps::MapInfo map_into = IdentityOf(*into), map_from = IdentityOf(*from);
   MergeScene(*from->scene, map_into, map_from, joined, into->history.Names(), scene.get());
   content::MapSettings gained = scene->settings;

@@ -80,7 +80,7 @@ std::string DayTable(const std::vector<VisitRecord>& visits) {
   std::map<std::string, VisitGroup> days;
   for (const VisitRecord& visit : visits) days[DateOf(visit.begin)].Add(visit);
   std::string html = "<h2>Days</h2>\n<table>" +
-                     TableRow("th", {"day", "visits", "median length", "images localized", "times lost"});
+                     TableRow("th", {"day", "visits", "median length", "images with a pose", "times lost"});
   for (const auto& [day, group] : days)
     html += TableRow(
         "td", {day, group.Visits(), group.MedianDuration(), group.Localized(), std::to_string(group.losses)});

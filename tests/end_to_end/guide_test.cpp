@@ -236,7 +236,7 @@ TEST(Guide, TheDemonstrationMakesMapsAndLeadsThroughThem) {
   ASSERT_EQ(demo.exit_status, 0) << demo.errors;
   EXPECT_THAT(demo.output, AllOf(HasSubstr("3 maps were built and content was placed in them.\n"),
                                  HasSubstr(" images, a wrong one in 0 %.\n"),
-                                 HasSubstr("Typical placement error: "), HasSubstr("Results: ")));
+                                 HasSubstr("Median placement error: "), HasSubstr("Results: ")));
   const maps::Library library = maps::Library::Open(folder / "demo/museum.docent", maps::Access::kReadOnly);
   EXPECT_THAT(library.Verify(), IsEmpty());
   EXPECT_EQ(library.List().size(), 3u);

@@ -28,7 +28,7 @@ TEST(HintText, IsASentenceForEachHintButNone) {
   EXPECT_EQ(TextOf(Hint::kMoveSideways), "Move sideways.");
   EXPECT_EQ(TextOf(Hint::kStartWhereThereIsDetail),
             "Too little detail here: point the camera at the exhibit.");
-  EXPECT_EQ(TextOf(Hint::kLeftMap), "You have left the mapped area: look back.");
+  EXPECT_EQ(TextOf(Hint::kLeftMap), "You have left the known area: look back.");
   std::set<std::string> texts;
   constexpr int kHints = static_cast<int>(Hint::kFollowOtherCamera) + 1;
   for (int i = 0; i < kHints; ++i) texts.insert(TextOf(static_cast<Hint>(i)));
@@ -96,6 +96,23 @@ TEST(MapperEventText, WarnsAboutACalibrationInWholeSentences) {
   EXPECT_EQ(InHall(MapperEvent::CalibrationContradicted{{620, 402.4}}),
             "warning: The calibration is probably wrong: its focal length is 620 px, but the map indicates "
             "about 400 px. Calibrate the camera with `docent calibrate`.");
+}
+
+TEST(JoinRefusalText, TellsAuthorsNoFigures) {
+  using Outcome = engine::MapOverlap::Outcome;
+  engine::MapOverlap overlap;
+  for (const Outcome outcome :
+       {Outcome::kNothingToCompare, Outcome::kNothingRecognized, Outcome::kTooFewConsecutive,
+        Outcome::kTooFewConfirmed, Outcome::kTooFewPoints, Outcome::kSurfacesDiffer, Outcome::kAmbiguous,
+        Outcome::kInterrupted}) {
+    overlap.outcome = outcome;
+    const std::string text = TextForAuthors(JoinRefusal::kNoOverlap, overlap);
+    EXPECT_NE(text, "");
+    EXPECT_EQ(text.find_first_of("0123456789%"), std::string::npos) << text;
+    EXPECT_EQ(text.find("keyframe"), std::string::npos) << text;
+  }
+  EXPECT_EQ(TextForAuthors(JoinRefusal::kTooManyIds, {}), "together they are too large for one map");
+  EXPECT_EQ(TextForAuthors(JoinRefusal::kNone, {}), "");
 }
 
 TEST(JoinRefusalText, SaysWhyTwoMapsWereNotJoined) {

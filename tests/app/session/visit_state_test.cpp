@@ -103,7 +103,7 @@ TEST(VisitState, HelpsMoreTheLongerAVisitorSearches) {
 
 TEST(VisitState, SaysThatALibraryIsEmpty) {
   VisitState visit({});
-  EXPECT_EQ(visit.Update(0, "", "hint").sentence, "There are no places in this library yet.");
+  EXPECT_EQ(visit.Update(0, "", "hint").sentence, "There are no places to visit here yet.");
 }
 
 }  // namespace
