@@ -18,6 +18,7 @@
 #include "maps/library/library.h"
 #include "tests/end_to_end/run_docent.h"
 #include "tests/end_to_end/screen_reader.h"
+#include "tests/support/must_run.h"
 #include "tests/support/virtual_screen.h"
 
 namespace docent::app {
@@ -40,8 +41,8 @@ class AuthorAtWindow : public ::testing::Test {
   static constexpr int kWidth = 1280, kHeight = 800;
 
   void SetUp() override {
-    if (!screen_.works()) GTEST_SKIP() << "Xvfb is not installed";
-    if (!HasXdotool()) GTEST_SKIP() << "xdotool is not installed";
+    if (!screen_.works()) SKIP_OR_FAIL("Xvfb is not installed");
+    if (!HasXdotool()) SKIP_OR_FAIL("xdotool is not installed");
     // The model is among the recent files, and so it is the one to place.
     const std::vector<std::uint8_t> glb = MakeExhibitGlb();
     folder_.Write("exhibit.glb", {glb.begin(), glb.end()});

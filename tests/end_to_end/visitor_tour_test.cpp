@@ -20,6 +20,7 @@
 #include "tests/end_to_end/five_stops.h"
 #include "tests/end_to_end/run_docent.h"
 #include "tests/end_to_end/screen_reader.h"
+#include "tests/support/must_run.h"
 #include "tests/support/virtual_screen.h"
 
 namespace docent::app {
@@ -37,8 +38,8 @@ constexpr double kRest_s = 125;
 class VisitorOfFiveStops : public ::testing::Test {
  protected:
   void SetUp() override {
-    if (!screen_.works()) GTEST_SKIP() << "Xvfb is not installed";
-    if (!HasXdotool()) GTEST_SKIP() << "xdotool is not installed";
+    if (!screen_.works()) SKIP_OR_FAIL("Xvfb is not installed");
+    if (!HasXdotool()) SKIP_OR_FAIL("xdotool is not installed");
     stops_.emplace();
     const TrueMuseum& museum = stops_->mapped().museum();
     rest_at_s_ = museum.Begin("visit0") + 0.7 * (museum.End("visit0") - museum.Begin("visit0"));

@@ -16,6 +16,7 @@
 #include "app/files/text_file.h"
 #include "maps/library/library.h"
 #include "tests/end_to_end/run_docent.h"
+#include "tests/support/must_run.h"
 #include "tests/support/virtual_screen.h"
 
 namespace docent::app {
@@ -27,8 +28,8 @@ constexpr const char* kHour = "sim:room,rest=3600,rest-at=1";
 class VisitorAtWindow : public ::testing::Test {
  protected:
   void SetUp() override {
-    if (!screen_.works()) GTEST_SKIP() << "Xvfb is not installed";
-    if (!HasXdotool()) GTEST_SKIP() << "xdotool is not installed";
+    if (!screen_.works()) SKIP_OR_FAIL("Xvfb is not installed");
+    if (!HasXdotool()) SKIP_OR_FAIL("xdotool is not installed");
     maps::Library library =
         maps::Library::Open(folder_ / "l.docent", maps::Access::kReadWrite, maps::CreateIfMissing::kYes);
     for (const char* name : {"Lions", "Masks"})

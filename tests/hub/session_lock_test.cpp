@@ -26,7 +26,7 @@ class HubSessionLock : public WithHubServer {
  protected:
   void SetUp() override {
     WithHubServer::SetUp();
-    if (IsSkipped()) return;
+    if (IsSkipped() || HasFatalFailure()) return;
     {
       Library a = OpenSampleLibrary(folder_ / "a");
       AddSampleMap(&a, "Desk", 7);

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <gtest/gtest.h>
+
 #include <cstdlib>
 
 namespace docent {
@@ -12,3 +14,11 @@ inline bool MustRun() {
 }
 
 }  // namespace docent
+
+// Ends a test, or a SetUp, that cannot run here because something is missing that ./bootstrap installs: it is
+// skipped, or fails where it must run.
+#define SKIP_OR_FAIL(why)                     \
+  do {                                        \
+    if (::docent::MustRun()) FAIL() << (why); \
+    GTEST_SKIP() << (why);                    \
+  } while (false)

@@ -153,7 +153,7 @@ class DegradedContentTest : public OffscreenTest {
   }
   void SetUp() override {
     OffscreenTest::SetUp();
-    if (IsSkipped()) return;
+    if (IsSkipped() || HasFatalFailure()) return;
     renderer_ = std::make_unique<Renderer>();
     scene_.entities.push_back(Facing(SquareModel(0.6f, glm::vec4(0.2f, 0.2f, 0.2f, 1)), {0, 0, 2}));
   }

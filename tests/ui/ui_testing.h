@@ -24,8 +24,7 @@ class OffscreenTest : public ::testing::Test {
     try {
       context_ = std::make_unique<OffscreenContext>();
     } catch (const Error& error) {
-      if (MustRun()) FAIL() << error.what();
-      GTEST_SKIP() << error.what();
+      SKIP_OR_FAIL(error.what());
     }
   }
   std::unique_ptr<OffscreenContext> context_;

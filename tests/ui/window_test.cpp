@@ -8,6 +8,7 @@
 #include <cstdlib>
 #include <optional>
 
+#include "tests/support/must_run.h"
 #include "tests/support/person_at_window.h"
 #include "tests/support/virtual_screen.h"
 #include "tests/ui/asked_for.h"
@@ -58,8 +59,8 @@ TEST(KeyName, IsTheDigitInEveryLayoutAndOnTheKeypad) {
 class InterfaceOnScreen : public ::testing::Test {
  protected:
   void SetUp() override {
-    if (!screen_.works()) GTEST_SKIP() << "Xvfb is not installed";
-    if (!HasXdotool()) GTEST_SKIP() << "xdotool is not installed";
+    if (!screen_.works()) SKIP_OR_FAIL("Xvfb is not installed");
+    if (!HasXdotool()) SKIP_OR_FAIL("xdotool is not installed");
     window_.emplace("Docent", 800, 600);
     gui_.emplace(&*window_);
     panel_.emplace(&asked_);

@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "tests/app/support/temporary_folder.h"
+#include "tests/support/must_run.h"
 #include "tests/support/person_at_window.h"
 #include "tests/support/virtual_screen.h"
 
@@ -24,8 +25,8 @@ using ::testing::IsEmpty;
 class AuthorAtControls : public ::testing::Test {
  protected:
   void SetUp() override {
-    if (!screen_.works()) GTEST_SKIP() << "Xvfb is not installed";
-    if (!HasXdotool()) GTEST_SKIP() << "xdotool is not installed";
+    if (!screen_.works()) SKIP_OR_FAIL("Xvfb is not installed");
+    if (!HasXdotool()) SKIP_OR_FAIL("xdotool is not installed");
     setenv("XDG_STATE_HOME", folder_.path().c_str(), 1);
     content::Scene scene;
     scene.entities.resize(1);

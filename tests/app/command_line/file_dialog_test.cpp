@@ -13,6 +13,7 @@
 #include <thread>
 
 #include "tests/app/support/temporary_folder.h"
+#include "tests/support/must_run.h"
 
 namespace docent::app {
 namespace {
@@ -86,7 +87,7 @@ class DesktopPortal : public ::testing::Test {
     const char* const address = std::getenv("DBUS_SESSION_BUS_ADDRESS");
     if (address != nullptr) address_ = address;
     if (std::system("command -v dbus-daemon >/dev/null") != 0)
-      GTEST_SKIP() << "dbus-daemon is not installed (./bootstrap installs it)";
+      SKIP_OR_FAIL("dbus-daemon is not installed (./bootstrap installs it)");
     daemon_ = g_test_dbus_new(G_TEST_DBUS_NONE);
     g_test_dbus_up(daemon_);  // sets DBUS_SESSION_BUS_ADDRESS
   }

@@ -19,6 +19,7 @@
 #include "tests/app/support/simulated_map.h"
 #include "tests/app/support/simulated_session.h"
 #include "tests/app/support/temporary_folder.h"
+#include "tests/support/must_run.h"
 #include "tests/support/virtual_screen.h"
 
 namespace docent::app {
@@ -167,7 +168,7 @@ TEST_F(PoseOfImage, IsThatOfTheDrawnFrameWhenFramesAreLate) {
 }
 
 TEST_F(PoseOfImage, IsThatOfTheDrawnFrameInASlowWindow) {
-  if (std::system("command -v Xvfb > /dev/null 2>&1") != 0) GTEST_SKIP() << "Xvfb is not installed";
+  if (std::system("command -v Xvfb > /dev/null 2>&1") != 0) SKIP_OR_FAIL("Xvfb is not installed");
   const VirtualScreen screen("800x600");
   ASSERT_TRUE(screen.works());
   // The window draws on a thread of its own and skips the frames for which it has no time.
