@@ -174,7 +174,9 @@ TEST(CommandLine, ReportsAFailureInOneLineWithExitStatusOne) {
 }
 
 TEST(CommandLine, ListsCamerasAsTextAndJson) {
-  EXPECT_EQ(RunDocent({"cameras"}).exit_status, 0);
+  const Outcome text = RunDocent({"cameras"});
+  EXPECT_EQ(text.exit_status, 0);
+  EXPECT_THAT(text.output, Not(IsEmpty())) << "it says so if there are none";
   const Outcome outcome = RunDocent({"cameras", "--json"});
   EXPECT_EQ(outcome.exit_status, 0);
   EXPECT_TRUE(nlohmann::json::parse(outcome.output).at("cameras").is_array());
