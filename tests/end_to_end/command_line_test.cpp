@@ -260,7 +260,7 @@ TEST(CommandLine, DoesNotRecordOverItsOwnImages) {
   EXPECT_EQ(ReadTextFile(video), "images");
 }
 
-TEST(CommandLine, HandlesAnEmptyLibrary) {
+TEST(CommandLine, SaysThatALibraryIsEmptyAndRefusesItsMaps) {
   const TemporaryFolder folder;
   const std::string path = (folder / "museum.docent").string();
   { maps::Library::Open(path, maps::Access::kReadWrite, maps::CreateIfMissing::kYes); }

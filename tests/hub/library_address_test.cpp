@@ -94,7 +94,7 @@ TEST_F(HubLibrary, ServesEveryCommandAsAFileDoes) {
   }
 }
 
-TEST_F(HubLibrary, WorksWithoutNetworkAndDeliversLater) {
+TEST_F(HubLibrary, IsReadAndChangedWithoutNetworkAndDeliversTheChangeLater) {
   Succeed(Url(), {"maps", "import", Samples()});
   UseDevice("second");
   ASSERT_THAT(Succeed(Url(), {"maps", "list"}), HasSubstr("Desk"));

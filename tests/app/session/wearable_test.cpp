@@ -338,7 +338,7 @@ TEST(Wearable, ACameraWhoseRecordingEndsHoldsTheOtherInNoMap) {
   }
 }
 
-TEST(Wearable, WorksWithOneThreadPerCamera) {
+TEST(Wearable, TracksBothCamerasOnThreadsOfTheirOwn) {
   const WalkOfTwoCameras walk = Take("hand", "shoulder", 8, Pace::kEager);
   EXPECT_EQ(walk.frames[0].size(), 161u);
   EXPECT_GE(walk.frames[1].size(), 150u);  // the run ends with the first camera
