@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <atomic>
+#include <chrono>
 #include <thread>
 #include <vector>
 
@@ -76,6 +77,7 @@ TEST(BoundedQueue, CloseWakesWaitingThreads) {
   ASSERT_TRUE(full.Push(1));
   std::jthread popper([&] { EXPECT_EQ(empty.Pop(), std::nullopt); });
   std::jthread pusher([&] { EXPECT_FALSE(full.Push(2)); });
+  std::this_thread::sleep_for(std::chrono::milliseconds(50));  // Until both wait.
   empty.Close();
   full.Close();
 }
