@@ -72,8 +72,11 @@ TEST(MapComparer, DropsAComparisonThatAnotherOneFollows) {
 }
 
 TEST(MapComparer, HasNoResultOfACancelledComparison) {
-  MapComparer comparer({}, [] {});
+  std::promise<void> done;
+  MapComparer comparer({}, [&] { done.set_value(); });
   comparer.Start(1, Left(), Right());
+  auto ready = done.get_future();
+  ASSERT_TRUE(IsReady(ready));
   comparer.Cancel();
   EXPECT_FALSE(comparer.Take());
 }
