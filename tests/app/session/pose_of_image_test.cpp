@@ -161,20 +161,22 @@ TEST_F(PoseOfImage, IsThatOfTheDrawnFrameWhenTheCameraDropsFrames) {
 }
 
 TEST_F(PoseOfImage, IsThatOfTheDrawnFrameWhenFramesAreLate) {
-  // Each drawing takes longer than the time between two images, so that the tracker drops images.
+  // Each drawing takes longer than the time between two images, so that the tracker drops images. On a busy
+  // machine only few are drawn while the recording lasts.
   const std::vector<Drawn> drawn = Tour(Options(), Pace::kRealtime, true, std::chrono::milliseconds(90));
   EXPECT_LT(static_cast<int>(drawn.size()), simulation_->frame_count() * 3 / 4) << "some must be dropped";
-  ExpectThatTheyBelongTogether(drawn, 15);
+  ExpectThatTheyBelongTogether(drawn, 4);
 }
 
 TEST_F(PoseOfImage, IsThatOfTheDrawnFrameInASlowWindow) {
   if (std::system("command -v Xvfb > /dev/null 2>&1") != 0) SKIP_OR_FAIL("Xvfb is not installed");
   const VirtualScreen screen("800x600");
   ASSERT_TRUE(screen.works());
-  // The window draws on a thread of its own and skips the frames for which it has no time.
+  // The window draws on a thread of its own and skips the frames for which it has no time. On a busy machine
+  // only few are drawn while the recording lasts.
   const std::vector<Drawn> drawn = Tour(Options(), Pace::kRealtime, false, std::chrono::milliseconds(150));
   EXPECT_LT(static_cast<int>(drawn.size()), simulation_->frame_count() * 3 / 4) << "some must be skipped";
-  ExpectThatTheyBelongTogether(drawn, 8);
+  ExpectThatTheyBelongTogether(drawn, 3);
 }
 
 }  // namespace
