@@ -3,11 +3,6 @@
 
 #include <gtest/gtest.h>
 
-#include <chrono>
-#include <thread>
-
-#include "app/sound/sound_player.h"
-
 namespace docent::app {
 namespace {
 
@@ -142,23 +137,6 @@ TEST(SoundDirector, CaptionsAreInTheReadersLanguage) {
   content::Scene scene{{SoundAt("roar", Eigen::Vector3d::Zero(), 2, 10), SoundAt("bell", {1, 0, 0}, 2, 10)}};
   SoundDirector director("de-at");
   EXPECT_EQ(director.Update(0, 1, scene, Eigen::Vector3d::Zero()).caption, "Text zu bell\nText zu roar");
-}
-
-TEST(SoundPlayer, SaysOnceWhatIsNotHeardAndGoesOn) {
-  // A file that is no sound, so that there is a problem with a device as well as without one.
-  SoundPlayer player;
-  SoundDirector::Orders orders;
-  orders.start.emplace_back(SoundDirector::Key(1, "roar"), std::make_shared<content::Asset>());
-  std::string problem;
-  for (int i = 0; i < 500 && problem.empty(); ++i) {
-    player.Give(orders);
-    std::this_thread::sleep_for(std::chrono::milliseconds(20));
-    problem = player.TakeProblem();
-  }
-  EXPECT_NE(problem.find("Sounds are not heard: "), std::string::npos) << problem;
-  player.Give(orders);
-  std::this_thread::sleep_for(std::chrono::milliseconds(50));
-  EXPECT_EQ(player.TakeProblem(), "");
 }
 
 }  // namespace

@@ -52,6 +52,12 @@ class SoundPlayerOfAFile : public ::testing::Test {
     orders.start.emplace_back(SoundDirector::Key{1, name}, LongTone());
     player_.Give(orders);
   }
+  // A file that is no sound.
+  void PlayDamaged() {
+    SoundDirector::Orders orders;
+    orders.start.emplace_back(SoundDirector::Key{1, "damaged"}, std::make_shared<content::Asset>());
+    player_.Give(orders);
+  }
   std::string WaitForProblem() {
     std::string problem;
     WaitUntil([&] { return !(problem = player_.TakeProblem()).empty(); });
@@ -100,6 +106,16 @@ TEST_F(SoundPlayerOfAFile, PlaysASoundThatBeginsTogetherWithADamagedOne) {
   player_.Give(orders);
   EXPECT_TRUE(IsToneHeard());
   EXPECT_THAT(WaitForProblem(), HasSubstr("Sounds are not heard"));
+}
+
+TEST_F(SoundPlayerOfAFile, SaysOnceWhatIsNotHeardAndGoesOn) {
+  std::filesystem::create_directory(folder_ / "device");
+  PlayDamaged();
+  EXPECT_THAT(WaitForProblem(), HasSubstr("Sounds are not heard: "));
+  PlayDamaged();
+  Play("tone");
+  EXPECT_TRUE(IsToneHeard());
+  EXPECT_EQ(player_.TakeProblem(), "");
 }
 
 TEST_F(SoundPlayerOfAFile, PlaysALaterSoundAfterItsDeviceWasLost) {
