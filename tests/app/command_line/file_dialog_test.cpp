@@ -14,6 +14,7 @@
 
 #include "tests/app/support/temporary_folder.h"
 #include "tests/support/must_run.h"
+#include "tests/support/wait_until.h"
 
 namespace docent::app {
 namespace {
@@ -111,7 +112,7 @@ class DesktopPortal : public ::testing::Test {
     answer_ = answer;
     context_ = g_main_context_new();
     thread_ = std::thread([this] { RunPortal(); });
-    while (!is_ready_) std::this_thread::sleep_for(std::chrono::milliseconds(5));
+    ASSERT_TRUE(WaitUntil([this] { return is_ready_.load(); }));
   }
   std::string asked() const {
     const std::scoped_lock lock(mutex_);
@@ -207,7 +208,7 @@ class DesktopPortal : public ::testing::Test {
 };
 
 TEST_F(DesktopPortal, GivesTheChosenFile) {
-  StartPortal(Answer::kChoose);
+  ASSERT_NO_FATAL_FAILURE(StartPortal(Answer::kChoose));
   PortalDialog dialog;
   ASSERT_TRUE(dialog.Open("Choose a model", "*.glb *.obj"));
   EXPECT_TRUE(dialog.is_open());
@@ -220,7 +221,7 @@ TEST_F(DesktopPortal, GivesTheChosenFile) {
 }
 
 TEST_F(DesktopPortal, GivesNothingWhenItIsCancelled) {
-  StartPortal(Answer::kCancel);
+  ASSERT_NO_FATAL_FAILURE(StartPortal(Answer::kCancel));
   PortalDialog dialog;
   ASSERT_TRUE(dialog.Open("Choose a model", "*.glb"));
   EXPECT_FALSE(AwaitChoice(&dialog));
@@ -229,18 +230,22 @@ TEST_F(DesktopPortal, GivesNothingWhenItIsCancelled) {
 }
 
 TEST_F(DesktopPortal, IsAskedToCloseADialogThatIsStillOpen) {
-  StartPortal(Answer::kNothing);
+  ASSERT_NO_FATAL_FAILURE(StartPortal(Answer::kNothing));
   {
     PortalDialog dialog;
     ASSERT_TRUE(dialog.Open("Choose a model", "*.glb"));
-    while (asked().empty()) EXPECT_FALSE(dialog.Poll());
+    const auto is_asked = [&] {
+      EXPECT_FALSE(dialog.Poll());
+      return !asked().empty();
+    };
+    ASSERT_TRUE(WaitUntil(is_asked));
   }
   for (int i = 0; i < 6000 && !is_closed(); ++i) std::this_thread::sleep_for(std::chrono::milliseconds(10));
   EXPECT_TRUE(is_closed());
 }
 
 TEST_F(DesktopPortal, SaysThatItHasNoFileDialog) {
-  StartPortal(Answer::kRefuse);
+  ASSERT_NO_FATAL_FAILURE(StartPortal(Answer::kRefuse));
   PortalDialog dialog;
   ASSERT_TRUE(dialog.Open("Choose a model", "*.glb"));
   EXPECT_FALSE(AwaitChoice(&dialog));

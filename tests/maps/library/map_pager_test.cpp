@@ -6,10 +6,10 @@
 #include <sqlite3.h>
 
 #include <atomic>
-#include <thread>
 
 #include "engine/base/error.h"
 #include "tests/maps/map_samples.h"
+#include "tests/support/wait_until.h"
 
 namespace docent::maps {
 namespace {
@@ -201,16 +201,19 @@ TEST_F(Pager, LoadsInTheBackgroundWhenQueriesMustNotWait) {
   pager.Open();
   for (const std::uint64_t key : {4, 5, 6, 4}) {
     // Repeated queries find it eventually, and a candidate always has its map.
-    for (bool there = false; !there; std::this_thread::yield()) {
+    const auto is_found = [&] {
+      bool found = false;
       for (const auto& candidate : pager.FindPlaces(ViewOf(key), 1, 1, 0)) {
         EXPECT_NE(candidate.map, nullptr);
-        there |= candidate.map_key == key;
+        found |= candidate.map_key == key;
       }
-    }
+      return found;
+    };
+    ASSERT_TRUE(WaitUntil(is_found)) << key;
   }
   const int before = read;
   pager.Prefetch({1});
-  while (read == before) std::this_thread::yield();
+  EXPECT_TRUE(WaitUntil([&] { return read > before; }));
 }
 
 }  // namespace

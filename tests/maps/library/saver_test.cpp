@@ -9,6 +9,7 @@
 
 #include "engine/base/error.h"
 #include "tests/maps/map_samples.h"
+#include "tests/support/wait_until.h"
 
 namespace docent::maps {
 namespace {
@@ -22,13 +23,13 @@ class SaverTest : public ::testing::Test {
     LibraryOptions options = QuickOptions();
     options.clock = [this] {
       ++saves_;
-      while (hold_) std::this_thread::yield();
+      WaitUntil([this] { return !hold_; });
       return WallTime{};
     };
     library_.emplace(Library::Open(folder_ / "a.docent", Access::kReadWrite, CreateIfMissing::kYes, options));
   }
   void WaitUntilASaveRuns() const {
-    while (saves_ == 0) std::this_thread::yield();
+    ASSERT_TRUE(WaitUntil([this] { return saves_ > 0; }));
   }
 
   TemporaryFolder folder_;
@@ -55,7 +56,7 @@ TEST_F(SaverTest, TheLatestSnapshotIsSavedAndAnEarlierSceneIsNotLost) {
   Saver saver(&*library_);
   hold_ = true;
   saver.Submit({a, "Busy", Policy::kOpen, MakeSampleMap(1), nullptr});
-  WaitUntilASaveRuns();
+  ASSERT_NO_FATAL_FAILURE(WaitUntilASaveRuns());
   const auto scene = MakeSampleScene(5, 1);
   const auto last = MakeSampleMap(10);
   saver.Submit({b, "Door", Policy::kOpen, MakeSampleMap(2), scene});
@@ -83,7 +84,7 @@ TEST_F(SaverTest, OfWaitingEstimatesOfALensTheLatestIsSaved) {
   Saver saver(&*library_);
   hold_ = true;
   saver.Submit({a, "Busy", Policy::kOpen, MakeSampleMap(1), nullptr});
-  WaitUntilASaveRuns();
+  ASSERT_NO_FATAL_FAILURE(WaitUntilASaveRuns());
   MapRecord record{b, "Door", Policy::kOpen, MakeSampleMap(2), nullptr};
   record.lenses = {lens("left", 500), lens("right", 500)};
   saver.Submit(record);
@@ -102,7 +103,7 @@ TEST_F(SaverTest, DoesNotRestoreAMapThatWasJoinedIntoAnother) {
   Saver saver(&*library_);
   hold_ = true;
   saver.Submit({b, "Door", Policy::kOpen, MakeSampleMap(2), nullptr});
-  WaitUntilASaveRuns();
+  ASSERT_NO_FATAL_FAILURE(WaitUntilASaveRuns());
   // The waiting save of `a` takes over that `b` was joined into it.
   saver.Submit({a, "Desk", Policy::kOpen, MakeSampleMap(1), nullptr});
   saver.Submit({b, "", Policy::kOpen, MakeSampleMap(3), nullptr});
@@ -147,7 +148,7 @@ TEST_F(SaverTest, AFullQueueBlocksOtherMapsButNotNewerStatesOfTheSame) {
   Saver saver(&*library_, 1);
   hold_ = true;
   saver.Submit({a, "A", Policy::kOpen, MakeSampleMap(1), nullptr});
-  WaitUntilASaveRuns();
+  ASSERT_NO_FATAL_FAILURE(WaitUntilASaveRuns());
   saver.Submit({b, "B", Policy::kOpen, MakeSampleMap(2), nullptr});
   saver.Submit({b, "B", Policy::kOpen, MakeSampleMap(3), nullptr});
   std::atomic<bool> submitting = false, submitted = false;
@@ -157,7 +158,7 @@ TEST_F(SaverTest, AFullQueueBlocksOtherMapsButNotNewerStatesOfTheSame) {
     submitted = true;
   });
   // Once the thread runs, a call that does not block returns long before this.
-  while (!submitting) std::this_thread::yield();
+  ASSERT_TRUE(WaitUntil([&] { return submitting.load(); }));
   std::this_thread::sleep_for(std::chrono::milliseconds(100));
   EXPECT_FALSE(submitted);
   EXPECT_EQ(saver.pending(), 2u);
@@ -176,7 +177,7 @@ TEST_F(SaverTest, SavesDoNotWaitForMaintenanceOrInterruptIt) {
     ++ended;
     return true;
   });
-  while (begun == 0) std::this_thread::yield();
+  ASSERT_TRUE(WaitUntil([&] { return begun > 0; }));
   for (std::uint64_t round = 1; round < 5; ++round) {
     saver.Submit({key, "Desk", Policy::kOpen, MakeSampleMap(round), nullptr});
     saver.Flush();
@@ -184,7 +185,7 @@ TEST_F(SaverTest, SavesDoNotWaitForMaintenanceOrInterruptIt) {
   }
   EXPECT_EQ(ended, 0);
   saver.InterruptMaintenance();
-  while (begun < 2) std::this_thread::yield();
+  ASSERT_TRUE(WaitUntil([&] { return begun >= 2; }));
   saver.EndMaintenance();
   const int at_the_end = begun;
   EXPECT_EQ(ended, at_the_end);
@@ -200,7 +201,7 @@ TEST_F(SaverTest, MaintenanceContinuesAndItsFailureIsReported) {
     if (++begun == 3) throw Error("no maintenance");
     return begun < 3;
   });
-  while (begun < 4) std::this_thread::yield();
+  ASSERT_TRUE(WaitUntil([&] { return begun >= 4; }));
   const std::exception_ptr error = saver.TakeError();
   ASSERT_NE(error, nullptr);
   EXPECT_THROW(std::rethrow_exception(error), Error);
