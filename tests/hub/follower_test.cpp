@@ -253,10 +253,19 @@ TEST_F(HubFollow, ATourShowsANewSignWithoutAPauseInTracking) {
                      });
                    }
                    if (frames > 90 && !engine::HasPose(frame.state)) ++lost_after;
-                   const auto scene = tour.ShownWith(frame).scene;
-                   if (is_saved && !delay_s && scene && !scene->entities.empty() &&
-                       scene->entities[0].signpost.text == "New")
-                     delay_s = std::chrono::duration<double>(Clock::now() - saved).count();
+                   const auto is_seen = [&] {
+                     const auto scene = tour.ShownWith(frame).scene;
+                     if (is_saved && !delay_s && scene && !scene->entities.empty() &&
+                         scene->entities[0].signpost.text == "New")
+                       delay_s = std::chrono::duration<double>(Clock::now() - saved).count();
+                     return delay_s.has_value();
+                   };
+                   is_seen();
+                   // The walk does not end before a slow hub has told of the sign.
+                   if (frames == 200) {
+                     push.wait();
+                     WaitUntil(is_seen, kLongest);
+                   }
                    std::this_thread::sleep_for(25ms);
                    last = Clock::now();
                  },
