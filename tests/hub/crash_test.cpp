@@ -5,12 +5,15 @@
 #include <unistd.h>
 
 #include <atomic>
+#include <cstdint>
 #include <cstdlib>
+#include <stop_token>
 #include <thread>
 
 #include "maps/hub/hub_connection.h"
 #include "tests/hub/hub_samples.h"
 #include "tests/hub/private_server.h"
+#include "tests/support/wait_until.h"
 
 // Kills the program while it pushes, and the server while it saves. DOCENT_HUB_KILLS sets how often.
 namespace docent::maps {
@@ -42,6 +45,11 @@ class HubCrash : public WithHubServer {
     EXPECT_THAT(library.Verify(), testing::IsEmpty());
     return std::stoi(SceneIn(library, library.FindByName("Desk").key).entities.at(0).signpost.text);
   }
+  // Up to this many milliseconds, so that each time something else is interrupted.
+  void SleepAtRandom(std::uint32_t longest_ms) {
+    random_ = random_ * 1664525 + 1013904223;
+    usleep(random_ / 65536 % longest_ms * 1000);
+  }
   static int Kills(int by_default) {
     const char* wanted = std::getenv("DOCENT_HUB_KILLS");
     return wanted ? std::atoi(wanted) : by_default;
@@ -57,11 +65,11 @@ class HubCrash : public WithHubServer {
 
   TemporaryFolder folder_;
   int first_ = 1, fresh_ = 0;
+  std::uint32_t random_ = 99;
 };
 
 TEST_F(HubCrash, AKilledPushLeavesNothingHalfAndLosesNothingAcknowledged) {
   ShareMap();
-  std::uint32_t random = 99;
   for (int kill_count = 0; kill_count < Kills(6); ++kill_count) {
     int ends[2];
     ASSERT_EQ(pipe(ends), 0);
@@ -71,8 +79,7 @@ TEST_F(HubCrash, AKilledPushLeavesNothingHalfAndLosesNothingAcknowledged) {
     int acknowledged = first_ - 1, number = 0;
     EXPECT_EQ(read(ends[0], &number, sizeof number), static_cast<ssize_t>(sizeof number));
     acknowledged = number;
-    random = random * 1664525 + 1013904223;
-    usleep(random / 65536 % 400 * 1000);
+    SleepAtRandom(400);
     kill(child, SIGKILL);
     waitpid(child, nullptr, 0);
     while (read(ends[0], &number, sizeof number) == sizeof number) acknowledged = number;
@@ -91,16 +98,15 @@ TEST_F(HubCrash, AKilledPushLeavesNothingHalfAndLosesNothingAcknowledged) {
 
 TEST_F(HubCrash, AKilledServerLosesNothingAcknowledged) {
   ShareMap();
-  std::atomic<bool> stop = false;
   std::atomic<int> acknowledged = 0, refused = 0;
-  std::thread pusher([&] {
-    for (int round = 1; !stop; ++round) {
+  std::jthread pusher([&](const std::stop_token& stop) {
+    for (int round = 1; !stop.stop_requested(); ++round) {
       {
         Library library = OpenSampleLibrary(folder_ / "own");
         EditScene(&library, library.FindByName("Desk").key,
                   [&](content::Scene* scene) { scene->entities[0].signpost.text = std::to_string(round); });
       }
-      while (!stop) {
+      while (!stop.stop_requested()) {
         try {
           if (Push(SampleSync(Url(), folder_ / "own")).problems == 0) acknowledged = round;
           break;
@@ -111,15 +117,21 @@ TEST_F(HubCrash, AKilledServerLosesNothingAcknowledged) {
       }
     }
   });
+  const auto await_push = [&] {
+    const int before = acknowledged;
+    return WaitUntil([&] { return acknowledged > before; });
+  };
   for (int kill_count = 0; kill_count < Kills(3); ++kill_count) {
-    usleep(300'000);
-    server().Crash();
+    EXPECT_TRUE(await_push());
+    SleepAtRandom(200);
+    const int before = refused;
+    server().Kill();
+    EXPECT_TRUE(WaitUntil([&] { return refused > before; })) << "the server was not missed";
+    server().Restart();
   }
-  usleep(300'000);
-  stop = true;
+  EXPECT_TRUE(await_push());
+  pusher.request_stop();
   pusher.join();
-  EXPECT_GT(acknowledged, 0);
-  EXPECT_GT(refused, 0) << "the server was never missed";
   EXPECT_GE(NumberOnHub(), acknowledged);
   EXPECT_EQ(Push(SampleSync(Url(), folder_ / "own")).problems, 0);
   const Library own = OpenSampleLibrary(folder_ / "own");

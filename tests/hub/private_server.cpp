@@ -8,15 +8,14 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
-#include <chrono>
 #include <cstdlib>
 #include <fstream>
 #include <pqxx/pqxx>
 #include <sstream>
-#include <thread>
 
 #include "engine/base/error.h"
 #include "maps/hub/administration.h"
+#include "tests/support/wait_until.h"
 
 namespace docent::maps {
 
@@ -70,22 +69,25 @@ void PrivateServer::Stop() {
   Run({"pg_ctl", "-D", (folder_ / "data").string(), "-m", "fast", "-w", "stop"});
 }
 
-void PrivateServer::Crash() {
+void PrivateServer::Kill() {
   pid_t postmaster = 0;
   std::ifstream(folder_ / "data" / "postmaster.pid") >> postmaster;
   if (postmaster <= 1) throw Error("the server has no process");
   kill(postmaster, SIGKILL);
-  // Its children end by themselves once they notice; until then another server refuses to start.
-  for (int attempt = 0; attempt < 100; ++attempt) {
-    std::this_thread::sleep_for(std::chrono::milliseconds(50));
+}
+
+void PrivateServer::Restart() {
+  // The children of a killed server end by themselves once they notice; until then another one refuses to
+  // start.
+  const auto has_started = [this] {
     try {
       Start();
-      return;
+      return true;
     } catch (const Error&) {
-      continue;
+      return false;
     }
-  }
-  throw Error("the server does not start after it was killed: " + Log());
+  };
+  if (!WaitUntil(has_started)) throw Error("the server does not start after it was killed: " + Log());
 }
 
 std::string PrivateServer::Url(const std::string& database, const std::string& user) const {

@@ -24,8 +24,9 @@ class PrivateServer {
 
   // The address of a database for this user; "postgres" may do everything.
   std::string Url(const std::string& database, const std::string& user = "postgres") const;
-  // Ends all processes of the server at once, as a power cut does, and starts it again.
-  void Crash();
+  // Ends the server at once, as a power cut does, and starts it again after that.
+  void Kill();
+  void Restart();
   // Stops and starts it in good order.
   void Stop();
   void Start();
