@@ -15,6 +15,7 @@
 #include "tests/end_to_end/run_docent.h"
 #include "tests/hub/hub_samples.h"
 #include "tests/hub/private_server.h"
+#include "tests/support/wait_until.h"
 
 // Exchanges with a hub while an authoring session has the library open.
 namespace docent::maps {
@@ -34,6 +35,12 @@ class HubSessionLock : public WithHubServer {
     Push(SampleSync(Url(), folder_ / "a"));
     Pull(SampleSync(Url(), folder_ / "b"));
   }
+  void TearDown() override { KillAuthor(); }
+  void KillAuthor() {
+    if (author_ <= 0) return;
+    kill(author_, SIGKILL);
+    waitpid(std::exchange(author_, -1), nullptr, 0);
+  }
   void AddSign(const std::string& device, const std::string& name, const std::string& text) {
     AddSampleSignpost(folder_ / device, "Desk", name, text);
   }
@@ -46,6 +53,7 @@ class HubSessionLock : public WithHubServer {
   }
 
   TemporaryFolder folder_;
+  pid_t author_ = -1;
 };
 
 TEST_F(HubSessionLock, APullReplacesNoMapOfASession) {
@@ -141,13 +149,11 @@ TEST_F(HubSessionLock, APushWithoutAMergeGoesOnBesideASession) {
 TEST_F(HubSessionLock, TheProgramSaysThatASessionHasTheLibraryOpen) {
   AddSign("a", "sign-2", "from a");
   Push(SampleSync(Url(), folder_ / "a"));
-  const pid_t author = app::StartDocent({"author", "--headless", "--library", (folder_ / "b").string(),
-                                         "--camera", "sim:room,duration=60", "--pace", "realtime"},
-                                        (folder_ / "out").string(), (folder_ / "errors").string());
-  const std::filesystem::path lock = folder_ / "b.session";
-  for (int i = 0; i < 600 && !std::filesystem::exists(lock); ++i)
-    std::this_thread::sleep_for(std::chrono::milliseconds(50));
-  EXPECT_TRUE(std::filesystem::exists(lock));
+  // The images of an hour, so that the session lasts until it is killed.
+  author_ = app::StartDocent({"author", "--headless", "--library", (folder_ / "b").string(), "--camera",
+                              "sim:room,rest=3600,rest-at=1", "--pace", "realtime"},
+                             (folder_ / "out").string(), (folder_ / "errors").string());
+  ASSERT_TRUE(WaitUntil([this] { return std::filesystem::exists(folder_ / "b.session"); }));
   const app::Outcome during =
       app::RunDocent({"maps", "pull", "--library", (folder_ / "b").string(), "--hub", Url()});
   EXPECT_EQ(during.exit_status, 1);
@@ -169,9 +175,7 @@ TEST_F(HubSessionLock, TheProgramSaysThatASessionHasTheLibraryOpen) {
       {"author", "--headless", "--library", (folder_ / "b").string(), "--camera", "sim:room,duration=1"});
   EXPECT_EQ(second.exit_status, 1);
   EXPECT_THAT(second.errors, HasSubstr("is already open in docent author"));
-  kill(author, SIGKILL);  // A session that ended so leaves the file, but not the lock.
-  int status = 0;
-  waitpid(author, &status, 0);
+  KillAuthor();  // A session that ended so leaves the file, but not the lock.
   const app::Outcome after =
       app::RunDocent({"maps", "pull", "--library", (folder_ / "b").string(), "--hub", Url()});
   EXPECT_EQ(after.exit_status, 0) << after.output << after.errors;
