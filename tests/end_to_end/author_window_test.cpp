@@ -2,7 +2,6 @@
 // The author's window of the real program, used by keys and clicks on a virtual screen.
 #include <gmock/gmock.h>
 
-#include <chrono>
 #include <cstdlib>
 #include <fstream>
 #include <functional>
@@ -10,7 +9,7 @@
 #include <optional>
 #include <sstream>
 #include <string>
-#include <thread>
+#include <utility>
 #include <vector>
 
 #include "app/demo/exhibit_model.h"
@@ -20,6 +19,7 @@
 #include "tests/end_to_end/screen_reader.h"
 #include "tests/support/must_run.h"
 #include "tests/support/virtual_screen.h"
+#include "tests/support/wait_until.h"
 
 namespace docent::app {
 namespace {
@@ -65,7 +65,7 @@ class AuthorAtWindow : public ::testing::Test {
          (folder_ / "script.txt").string(), "--record-script", (folder_ / "recorded.txt").string(),
          "--autosave", autosave, "--output", (folder_ / "run").string()},
         (folder_ / "out").string(), (folder_ / "err").string());
-    Do("search --sync --onlyvisible --name Docent windowfocus");
+    ASSERT_TRUE(Wait(FocusWindow)) << ReadAll(folder_ / "err");
   }
   // Waits until the map has depth, so that something can be placed in it; at most two minutes. The file has
   // its final name at the end of the run.
@@ -77,13 +77,9 @@ class AuthorAtWindow : public ::testing::Test {
     };
     EXPECT_TRUE(Wait(has_started));
   }
-  // At most two minutes.
-  static bool Wait(const std::function<bool()>& is_so) {
-    for (int i = 0; i < 1200; ++i) {
-      if (is_so()) return true;
-      std::this_thread::sleep_for(std::chrono::milliseconds(100));
-    }
-    return false;
+  // At most two minutes, and no longer than the program runs.
+  bool Wait(const std::function<bool()>& is_so) const {
+    return WaitWhileRunning([this] { return IsRunning(); }, is_so);
   }
   std::string library() { return (folder_ / "room.docent").string(); }
   static void Do(const std::string& xdotool) {
@@ -118,7 +114,7 @@ class AuthorAtWindow : public ::testing::Test {
     EXPECT_TRUE(Wait([this] { return AsksWhetherToSave() || !IsRunning(); }));
     EXPECT_TRUE(IsRunning()) << "it asks first";
   }
-  bool IsRunning() {
+  bool IsRunning() const {
     siginfo_t ended{};
     waitid(P_PID, static_cast<id_t>(child_), &ended, WEXITED | WNOHANG | WNOWAIT);
     return ended.si_pid == 0;
@@ -138,7 +134,7 @@ class AuthorAtWindow : public ::testing::Test {
 };
 
 TEST_F(AuthorAtWindow, PlacesSelectsAndRemovesWithUndoAndSavesAtTheEnd) {
-  Start("0.1 map new Room\n", "0");
+  ASSERT_NO_FATAL_FAILURE(Start("0.1 map new Room\n", "0"));
   WaitForMap();
   Press("2");
   for (int i = 0; i < 12; ++i) Click(480, 520);
@@ -170,7 +166,7 @@ TEST_F(AuthorAtWindow, PlacesSelectsAndRemovesWithUndoAndSavesAtTheEnd) {
 }
 
 TEST_F(AuthorAtWindow, PlacesWithTheKeyboardAlone) {
-  Start("0.1 map new Room\n", "0");
+  ASSERT_NO_FATAL_FAILURE(Start("0.1 map new Room\n", "0"));
   WaitForMap();
   Press("2");
   for (int i = 0; i < 12; ++i) Press("Return");
@@ -195,7 +191,7 @@ TEST_F(AuthorAtWindow, PlacesWithTheKeyboardAlone) {
 }
 
 TEST_F(AuthorAtWindow, CanQuitWithoutSaving) {
-  Start("0.1 map new Room\n", "0");
+  ASSERT_NO_FATAL_FAILURE(Start("0.1 map new Room\n", "0"));
   WaitForMap();
   AskToQuit();
   Press("Right");  // To the second answer.

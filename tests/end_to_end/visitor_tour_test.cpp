@@ -74,11 +74,7 @@ class VisitorOfFiveStops : public ::testing::Test {
                                           Tour().string()};
     arguments.insert(arguments.end(), more.begin(), more.end());
     child_ = StartDocent(arguments, Tour().string() + ".out", Tour().string() + ".err");
-    // A window that has just been made may refuse the keyboard.
-    Wait("the window", [] {
-      return std::system("xdotool search --onlyvisible --name Docent windowfocus --sync > /dev/null 2>&1") ==
-             0;
-    });
+    Wait("the window", FocusWindow);
   }
   // Waits until the walk has ended.
   void End() {

@@ -9,7 +9,6 @@
 #include <optional>
 #include <sstream>
 #include <string>
-#include <thread>
 #include <utility>
 #include <vector>
 
@@ -18,6 +17,7 @@
 #include "tests/end_to_end/run_docent.h"
 #include "tests/support/must_run.h"
 #include "tests/support/virtual_screen.h"
+#include "tests/support/wait_until.h"
 
 namespace docent::app {
 namespace {
@@ -49,10 +49,11 @@ class VisitorAtWindow : public ::testing::Test {
     Xdotool("search --name Docent windowfocus sleep 0.2 key --delay 300 " + keys + " sleep 0.3");
   }
 
-  // At most two minutes.
-  static void Wait(const std::function<bool()>& is_so) {
-    for (int i = 0; i < 1200 && !is_so(); ++i) std::this_thread::sleep_for(std::chrono::milliseconds(100));
+  // At most two minutes, and no longer than the program runs. Returns whether it is so.
+  bool Wait(const std::function<bool()>& is_so) const {
+    return WaitWhileRunning([this] { return IsRunning(); }, is_so);
   }
+  void AwaitWindow() const { ASSERT_TRUE(Wait(FocusWindow)) << ReadAll(folder_ / "errors"); }
   bool IsRunning() const {
     siginfo_t ended{};
     waitid(P_PID, static_cast<id_t>(child_), &ended, WEXITED | WNOHANG | WNOWAIT);
@@ -60,8 +61,7 @@ class VisitorAtWindow : public ::testing::Test {
   }
   // Waits for the end; empty if the program still runs.
   std::optional<int> ExitStatus() {
-    Wait([this] { return !IsRunning(); });
-    if (IsRunning()) return std::nullopt;
+    if (!Wait([this] { return !IsRunning(); })) return std::nullopt;
     int status = -1;
     waitpid(std::exchange(child_, -1), &status, 0);
     return WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status);
@@ -76,7 +76,7 @@ TEST_F(VisitorAtWindow, SkipsStopsAndIsLedBackByKeys) {
   child_ = StartDocent({"tour", "--library", (folder_ / "l.docent").string(), "--camera", kHour, "--tour",
                         "All", "--output", (folder_ / "out").string()},
                        (folder_ / "output").string(), (folder_ / "errors").string());
-  Xdotool("search --sync --onlyvisible --name Docent windowfocus");
+  ASSERT_NO_FATAL_FAILURE(AwaitWindow());
   PressKeys("l b n b n n n");
   // The key's release reaches no window any more.
   const int ignored =
@@ -103,7 +103,7 @@ TEST_F(VisitorAtWindow, IsAnsweredBeforeTheNextImage) {
       {"tour", "--library", (folder_ / "l.docent").string(), "--camera", std::string(kHour) + ",fps=0.0125",
        "--tour", "All", "--pace", "realtime", "--output", (folder_ / "out").string()},
       (folder_ / "output").string(), (folder_ / "errors").string());
-  Xdotool("search --sync --onlyvisible --name Docent windowfocus");
+  ASSERT_NO_FATAL_FAILURE(AwaitWindow());
   const auto count = [this](const std::string& part) {
     std::istringstream lines(ReadAll(folder_ / "out/events.csv.part"));
     int found = 0;
@@ -111,10 +111,11 @@ TEST_F(VisitorAtWindow, IsAnsweredBeforeTheNextImage) {
     return found;
   };
   PressKeys("n");
-  Wait([&] { return count("command,tour") == 1; });  // The first image is shown.
+  // The first image is shown.
+  ASSERT_TRUE(Wait([&] { return count("command,tour") == 1; })) << ReadAll(folder_ / "errors");
   const auto begin = std::chrono::steady_clock::now();
   PressKeys("b n");
-  Wait([&] { return count("command,tour") == 3; });
+  EXPECT_TRUE(Wait([&] { return count("command,tour") == 3; })) << ReadAll(folder_ / "errors");
   EXPECT_LT(std::chrono::steady_clock::now() - begin, std::chrono::seconds(50));
   EXPECT_EQ(count("command,tour skip"), 2);
   EXPECT_EQ(count("skipped 'Lions'"), 1);
@@ -135,16 +136,19 @@ TEST_F(VisitorAtWindow, AKioskEndsByItsCodeOnlyAndStartsAgainAfterACrash) {
   child_ = StartDocent({"tour", "--library", (folder_ / "l.docent").string(), "--camera", kHour, "--tour",
                         "All", "--kiosk", (folder_ / "code").string(), "--pace", "realtime"},
                        (folder_ / "output").string(), (folder_ / "errors").string());
-  Xdotool("search --sync --onlyvisible --name Docent windowfocus");
+  ASSERT_NO_FATAL_FAILURE(AwaitWindow());
   PressKeys("ctrl+q Escape q F11 0 4 7 1 2");
   const pid_t worker = WorkerOf(child_);
   ASSERT_GT(worker, 0) << ReadAll(folder_ / "errors");
   EXPECT_EQ(kill(worker, 0), 0) << "it still runs";
   kill(worker, SIGKILL);
-  Wait([&] { return WorkerOf(child_) > 0 && WorkerOf(child_) != worker; });
-  ASSERT_GT(WorkerOf(child_), 0) << ReadAll(folder_ / "errors");
+  const auto has_begun_again = [&] {
+    const pid_t now = WorkerOf(child_);
+    return now > 0 && now != worker;
+  };
+  ASSERT_TRUE(Wait(has_begun_again)) << ReadAll(folder_ / "errors");
   EXPECT_THAT(ReadAll(folder_ / "errors"), ::testing::HasSubstr("it begins again in 1 s"));
-  Xdotool("search --sync --onlyvisible --name Docent windowfocus");
+  ASSERT_NO_FATAL_FAILURE(AwaitWindow());
   PressKeys("4 7 1");
   // The key's release reaches no window any more.
   const int ignored =

@@ -57,4 +57,10 @@ inline bool HasXdotool() {
   return std::system("command -v xdotool > /dev/null 2>&1") == 0;
 }
 
+// Gives the keyboard to the window of the program. Returns whether it has it: a window that has just been
+// made may refuse it, so that it takes several attempts.
+inline bool FocusWindow() {
+  return std::system("xdotool search --onlyvisible --name Docent windowfocus --sync > /dev/null 2>&1") == 0;
+}
+
 }  // namespace docent

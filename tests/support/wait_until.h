@@ -19,4 +19,17 @@ inline bool WaitUntil(const std::function<bool()>& is_so,
   return true;
 }
 
+// The same for what a program is to bring about: what it has not done at its end is not waited for.
+inline bool WaitWhileRunning(const std::function<bool()>& is_running, const std::function<bool()>& is_so,
+                             std::chrono::milliseconds longest = std::chrono::minutes(2)) {
+  bool is = false;
+  WaitUntil(
+      [&] {
+        const bool has_ended = !is_running();  // Asked first, so that what the program did last counts.
+        return (is = is_so()) || has_ended;
+      },
+      longest);
+  return is;
+}
+
 }  // namespace docent
