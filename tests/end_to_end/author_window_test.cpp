@@ -13,6 +13,8 @@
 
 #include "app/demo/exhibit_model.h"
 #include "app/files/text_file.h"
+#include "app/session/library_scene.h"
+#include "content/scene.h"
 #include "maps/library/library.h"
 #include "tests/end_to_end/run_docent.h"
 #include "tests/end_to_end/screen_reader.h"
@@ -151,8 +153,11 @@ TEST_F(AuthorAtWindow, PlacesSelectsAndRemovesWithUndoAndSavesAtTheEnd) {
   EXPECT_LT(duplicated, removed) << recorded;
   EXPECT_LT(removed, undone) << recorded;
   const maps::Library stored = maps::Library::Open(library(), maps::Access::kReadOnly);
-  ASSERT_EQ(stored.List().size(), 1u);
-  EXPECT_EQ(stored.LoadScene(stored.List().front().key).assets.size(), 1u);
+  const std::vector<maps::MapInfo> listed = stored.List();
+  ASSERT_EQ(listed.size(), 1u);
+  AssetCache assets;
+  const content::Scene scene = SceneFromRecord(stored.LoadScene(listed[0].key), listed[0].name, &assets);
+  EXPECT_EQ(scene.entities.size(), 2u) << "what was removed is there again";
 }
 
 TEST_F(AuthorAtWindow, PlacesWithTheKeyboardAlone) {
