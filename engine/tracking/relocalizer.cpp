@@ -77,6 +77,16 @@ Relocalizer::Attempt Relocalizer::SearchNearby(const PoseSearch& search, Tracked
       return Attempt::kEnded;
     }
   }
+  // Where the map is where visual odometry expects it, but only a part of the image shows it, odometry has
+  // the better position. Place recognition had put a visitor 0.6 m away before a wall then, in 7 of 20 visits
+  // to a rendered room.
+  if (rejection == RejectionReason::kClustered && search.has_odometry &&
+      AreOfOnePlace(guess, result.camera_from_map, result.median_depth) &&
+      (!search.finder || !HasBetterCompetitor(search, result, out))) {
+    if (search.hypothesis->map_key() == search.map_key) search.hypothesis->Clear();
+    out->relocalization = {.rejection = rejection, .map_key = search.map_key, .inliers = result.inliers};
+    return Attempt::kEnded;
+  }
   out->relocalization.Consider(
       {.rejection = rejection, .map_key = search.map_key, .inliers = result.inliers});
   search.pose->ContinueFrom(search.image.time, guess);

@@ -151,6 +151,28 @@ TEST_F(TwoRooms, AreReturnedToAtOnceByPlaceRecognition) {
   EXPECT_TRUE(IsHere(found->result.camera_from_map));
 }
 
+// Another map shows the same room, as a place that looks alike would.
+TEST_F(TwoRooms, AreNotSearchedWhereTheMapConfirmsOdometry) {
+  options_.min_relocalization_cells = 17;  // more than there are: the points of every pose are clustered
+  criteria_ = PoseCriteria(options_);
+  SomeMaps others;
+  others.Add(kOtherKey, TheMap());
+  for (const bool has_odometry : {false, true}) {
+    pose_.Begin(Timestamp{}, Here(), ObservedMotion::kSixDof);
+    relocalizer_.Lose(Timestamp{});
+    hypothesis_.Clear();
+    out_ = {};
+    const CameraImage image = ImageAt(Here(), 1);
+    PoseSearch search = Search(image, kKey);
+    search.finder = &others;
+    search.has_odometry = has_odometry;
+    EXPECT_FALSE(relocalizer_.Search(search, &out_));
+    EXPECT_EQ(hypothesis_.exists(), !has_odometry);
+    EXPECT_EQ(out_.relocalization.rejection,
+              has_odometry ? RejectionReason::kClustered : RejectionReason::kUnconfirmed);
+  }
+}
+
 TEST_F(TwoRooms, AreEnteredAfterSeveralFramesAgree) {
   relocalizer_.LoseLongAgo();
   std::optional<FoundPose> found;
