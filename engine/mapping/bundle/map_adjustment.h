@@ -24,8 +24,9 @@ struct MapAdjustmentOptions {
 };
 
 // Adjusts `keyframe`, the keyframes that share most points with it, and all their points; everything else is
-// fixed (ptamm §2.3). Removes outlying observations. Fails if there is no such keyframe. Where ten keyframes
-// or more have one fixed centre only, the map keeps its scale.
+// fixed (ptamm §2.3). Removes outlying observations. Fails if there is no such keyframe. Where the fixed
+// keyframes have one centre only, the map keeps its scale: by the distances of the keyframes from it, or of
+// the points where there are fewer than ten keyframes.
 BundleSummary AdjustLocally(const MapAdjustmentOptions& options, KeyFrameId keyframe,
                             const std::atomic<bool>* interrupt, Map* map);
 // The same for every keyframe and point; the keyframes marked `fixed` define the coordinate frame.

@@ -8,6 +8,7 @@
 #include <limits>
 #include <vector>
 
+#include "engine/base/median.h"
 #include "engine/base/random.h"
 #include "tests/engine/rendered_world.h"
 
@@ -90,6 +91,31 @@ TEST_F(MapAdjustment, RemovesTheNoiseOfTheWholeMap) {
   EXPECT_LT(Compare(&map).median_point_m, 2e-3);
   EXPECT_EQ(Validate(*map.Snapshot()), "");
   EXPECT_GT(map.AlivePoints(), truth_->points.size() * 9 / 10);
+}
+
+TEST_F(MapAdjustment, KeepsTheDistancesOfThePointsWhereOneOfFewKeyframesIsFixed) {
+  for (std::uint64_t seed = 1; seed <= 5; ++seed) {
+    Map map = Noisy(0.01, 0.4, seed);
+    map.FindKeyFrame(1)->keyframe.fixed = false;
+    // The keyframes are too far from one another for the distances of the points.
+    for (auto& [id, record] : map.keyframes()) {
+      if (!record.keyframe.fixed) record.keyframe.camera_from_map.translation *= 1.3;
+    }
+    const auto before = map.Snapshot();
+    for (int round = 0; round < 3; ++round) AdjustGlobally({}, nullptr, &map);
+    AdjustLocally({}, 4, nullptr, &map);
+    std::vector<double> ratios;
+    for (const MapPoint& point : before->points) {
+      if (const auto* record = map.FindPoint(point.id))
+        ratios.push_back(record->point.position().norm() / point.position().norm());
+    }
+    EXPECT_NEAR(Median(ratios), 1, 0.002) << "seed " << seed;
+    // Apart from the scale, the map becomes the true one.
+    const auto distance = [&](KeyFrameId id) {
+      return map.FindKeyFrame(id)->keyframe.camera_from_map.OriginInSource().norm();
+    };
+    EXPECT_NEAR(distance(2) / distance(1), Poses()[2].OriginInSource().norm() / 0.25, 0.01);
+  }
 }
 
 TEST_F(MapAdjustment, KeepsTheDistancesOfManyKeyframesWhereOneIsFixed) {
