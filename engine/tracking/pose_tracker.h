@@ -97,6 +97,9 @@ class PoseTracker {
   // Rotation vector per frame, of the last tracked frame.
   const Eigen::Vector3d& rotation_rate() const { return rotation_rate_; }
   double median_depth() const { return median_depth_; }
+  // Where the points determine only the rotation, the position is known too: that of a reliable rotation
+  // centre.
+  bool has_rotation_center() const { return pivot_estimate_.reliable; }
 
  private:
   // Gives the present image the rolling shutter of a camera that moves with this left twist per second.

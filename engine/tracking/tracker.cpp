@@ -336,8 +336,10 @@ void Tracker::Accept(const MapTrackResult& result, TrackedFrame* out) {
   if ((good || !from_points) && may_extend && options_.build_maps)
     offers_.Consider(image_, *map_, {result, out->matches, tracked.panorama(), pose_.median_depth()});
   if (!options_.build_maps && from_points)
-    odometry_.AddMapPose(image_, *map_, {result, out->matches, tracked.panorama(), pose_.median_depth()},
-                         good);
+    odometry_.AddMapPose(image_, *map_,
+                         {.tracked = {result, out->matches, tracked.panorama(), pose_.median_depth()},
+                          .good = good,
+                          .rotation_center = pose_.has_rotation_center()});
 }
 
 void Tracker::SetPose(const MapTrackResult& result, bool good, TrackedFrame* out) const {

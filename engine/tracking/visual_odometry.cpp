@@ -23,6 +23,15 @@ TrackerOptions OptionsOfOdometry(TrackerOptions options) {
   return options;
 }
 
+// Before a distant wall, points alone do not determine the position. While the camera turns about a known
+// centre, it is that of the centre.
+bool IsOfRotationCenter(const VisualOdometry::MapPose& pose, const TrackerOptions& options) {
+  const MapTrackResult& result = pose.tracked.result;
+  return result.observed == ObservedMotion::kPanorama && pose.rotation_center &&
+         result.inliers == result.finite_inliers &&
+         result.finite_inliers >= options.min_relocalization_inliers;
+}
+
 }  // namespace
 
 VisualOdometry::VisualOdometry(const TrackerOptions& options,
@@ -50,18 +59,23 @@ void VisualOdometry::Reset() {
   offers_.Reset();
 }
 
-void VisualOdometry::AddMapPose(const CameraImage& image, const MapSnapshot& map,
-                                const KeyFrameOffers::TrackedPose& pose, bool good) {
+void VisualOdometry::AddMapPose(const CameraImage& image, const MapSnapshot& map, const MapPose& pose) {
   // What was added during a long odometry may be as far off as its pose.
   if (active_ && image.time - last_map_pose_ > FromSeconds(options_.short_loss_s)) Reset();
   active_ = false;
   last_map_pose_ = image.time;
-  if (good && options_.max_odometry_s > 0 && pose.result.finite_inliers < options_.few_points_of_map)
-    offers_.Consider(image, copy_ ? *copy_ : map, pose);
+  MapTrackResult result = pose.tracked.result;
+  // Without keyframes of these images, a visitor who turned on behind people was lost where the map ended.
+  if (IsOfRotationCenter(pose, options_)) result.observed = ObservedMotion::kSixDof;
+  has_position_ = result.observed != ObservedMotion::kPanorama;
+  if (!pose.good || options_.max_odometry_s <= 0 || result.finite_inliers >= options_.few_points_of_map)
+    return;
+  offers_.Consider(image, copy_ ? *copy_ : map,
+                   {result, pose.tracked.matches, pose.tracked.panorama, pose.tracked.median_depth});
 }
 
 void VisualOdometry::Begin(const PoseTracker& lost) {
-  if (active_ || !copy_ || lost.observed() == ObservedMotion::kPanorama) return;
+  if (active_ || !copy_ || (lost.observed() == ObservedMotion::kPanorama && !has_position_)) return;
   pose_.ContinueFrom(lost);
   lost_since_.reset();
   active_ = true;
