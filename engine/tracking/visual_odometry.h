@@ -36,11 +36,11 @@ class VisualOdometry {
     bool good = false;             // its quality
     bool rotation_center = false;  // see PoseTracker::has_rotation_center
   };
-  // This ends the odometry. Where the points are few, and the quality is good, the image is offered as a
-  // keyframe of the copy.
+  // Such a pose ends the odometry. Where the points are few, and the quality is good, the image is offered as
+  // a keyframe of the copy.
   void AddMapPose(const CameraImage& image, const MapSnapshot& map, const MapPose& pose);
   // The map no longer determines the pose of the present image: the odometry goes on from the last one, if
-  // there is a copy and points determined that pose.
+  // there is a copy and the position is known: from points, or as that of a rotation centre.
   void Begin(const PoseTracker& lost);
   bool is_active() const { return active_; }
   bool has_pose() const { return active_ && !lost_since_; }  // of the last image
@@ -70,7 +70,7 @@ class VisualOdometry {
   bool active_ = false, invalid_copy_ = false;
   std::optional<Timestamp> lost_since_;  // while the points of the copy are not found
   Timestamp last_map_pose_{};            // time of the last pose that came from the map
-  bool has_position_ = false;            // that pose
+  bool has_position_ = false;            // whether that pose included the position
 };
 
 }  // namespace docent::engine
