@@ -140,10 +140,12 @@ struct MotionConstraint {
 // One robust Gauss-Newton refinement of a pose. Used on the stack of one RefinePose call.
 class PoseDescent {
  public:
-  PoseDescent(const CameraModel& camera, const PoseRefinementOptions& options, const MotionPrior& prior,
+  PoseDescent(const CameraModel& camera, const CameraAtPose& camera_at_pose,
+              const PoseRefinementOptions& options, const MotionPrior& prior,
               const MotionConstraint& constraint, std::vector<PoseMeasurement>* measurements,
               PoseRefinementMemory* memory)
-      : camera_(camera),
+      : camera_(&camera),
+        camera_at_pose_(camera_at_pose),
         options_(options),
         prior_(prior),
         constraint_(constraint),
@@ -165,7 +167,9 @@ class PoseDescent {
   std::optional<double> Update();
   void EstimateCovariance();
 
-  const CameraModel& camera_;
+  const CameraModel* camera_;
+  const CameraAtPose& camera_at_pose_;
+  std::shared_ptr<const CameraModel> camera_of_pose_;  // what it returned
   const PoseRefinementOptions& options_;
   const MotionPrior& prior_;
   const MotionConstraint& constraint_;
@@ -188,6 +192,10 @@ PoseRefinement PoseDescent::From(const Rigid3& start) {
     // The last pass only computes weights and counts at the final pose.
     const bool last = iteration == options_.iterations;
     const bool tukey = iteration >= options_.iterations / 2;
+    if (tukey && camera_at_pose_ && !camera_of_pose_) {
+      camera_of_pose_ = camera_at_pose_(result_.camera_from_map);
+      camera_ = camera_of_pose_.get();
+    }
     Project(tukey);
     Accumulate(tukey);
     measured_ = normal_;
@@ -212,7 +220,7 @@ void PoseDescent::Project(bool tukey) {
   memory_.projections.clear();
   for (const PoseMeasurement& measurement : measurements_)
     memory_.projections.push_back(
-        ProjectMeasurement(camera_, rotation, result_.camera_from_map.translation, measurement));
+        ProjectMeasurement(*camera_, rotation, result_.camera_from_map.translation, measurement));
   for (const bool infinite : {false, true})
     scales_[infinite] = EstimateScale(measurements_, infinite, options_, tukey, &memory_);
 }
@@ -312,7 +320,11 @@ std::optional<std::string> PoseRefinementOptions::Validate() const {
 
 PoseRefinement RefinePose(const CameraModel& camera, const Rigid3& start,
                           const PoseRefinementOptions& options, std::vector<PoseMeasurement>* measurements,
-                          PoseRefinementMemory* memory, const MotionPrior& prior) {
+                          PoseRefinementMemory* memory, const MotionPrior& prior,
+                          const CameraAtPose& camera_at_pose) {
+  const auto descend = [&](const MotionPrior& motion, const MotionConstraint& constraint) {
+    return PoseDescent(camera, camera_at_pose, options, motion, constraint, measurements, memory).From(start);
+  };
   const auto finite = std::count_if(measurements->begin(), measurements->end(),
                                     [](const PoseMeasurement& m) { return !m.infinite(); });
   const auto infinite = static_cast<std::ptrdiff_t>(measurements->size()) - finite;
@@ -320,7 +332,7 @@ PoseRefinement RefinePose(const CameraModel& camera, const Rigid3& start,
   MotionConstraint constraint;
   if (finite >= options.min_finite || !rotation_observable) {
     constraint.infinite_weight = options.infinite_weight;
-    PoseRefinement result = PoseDescent(camera, options, prior, constraint, measurements, memory).From(start);
+    PoseRefinement result = descend(prior, constraint);
     Rigid3 camera_from_map_without_prior = result.camera_from_map;
     const bool enough_finite = result.finite_inliers >= options.min_finite;
     const bool position_observable =
@@ -328,12 +340,12 @@ PoseRefinement RefinePose(const CameraModel& camera, const Rigid3& start,
     const bool needs_prior = !enough_finite || !IsPositionObservable(result, options.max_position_sigma / 2);
     if (prior.reliable && enough_finite && needs_prior) {
       constraint.sigma = options.prior_translation_sigma * result.mean_depth;
-      result = PoseDescent(camera, options, prior, constraint, measurements, memory).From(start);
+      result = descend(prior, constraint);
     } else if (prior.center && needs_prior && (!rotation_observable || position_observable)) {
       constraint.sigma = prior.center->sigma / options.common_error_factor;
       const MotionPrior center{Eigen::Vector3d::Zero(),
                                Rigid3(start.rotation, -(start.rotation * prior.center->center))};
-      result = PoseDescent(camera, options, center, constraint, measurements, memory).From(start);
+      result = descend(center, constraint);
       result.used_center = true;
       camera_from_map_without_prior = result.camera_from_map;
     }
@@ -348,7 +360,7 @@ PoseRefinement RefinePose(const CameraModel& camera, const Rigid3& start,
     constraint.infinite_weight = 1;
   }
   constraint.rotation_only = constraint.sigma == 0;
-  PoseRefinement result = PoseDescent(camera, options, prior, constraint, measurements, memory).From(start);
+  PoseRefinement result = descend(prior, constraint);
   result.observed = ObservedMotion::kPanorama;
   return result;
 }

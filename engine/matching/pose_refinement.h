@@ -3,6 +3,8 @@
 
 #include <Eigen/Core>
 #include <cstdint>
+#include <functional>
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
@@ -106,12 +108,18 @@ struct PoseRefinementMemory {
   std::vector<double> squared_errors;
 };
 
+// The camera model of an image, given an estimate of its pose: the motion of the camera during the readout of
+// a rolling shutter depends on the pose.
+using CameraAtPose = std::function<std::shared_ptr<const CameraModel>(const Rigid3& camera_from_map)>;
+
 // Robust Gauss-Newton on the reprojection errors of finite and infinite points from `start` (ptamm eq. 1-3,
 // hybrid-slam eq. 1-2), with Huber weights in the first iterations and Tukey weights in the last. The error
 // scales of finite and infinite points are estimated separately, because a small translation shifts infinite
-// points and must not count as noise of finite ones. Allocates only in *memory.
+// points and must not count as noise of finite ones. Allocates only in *memory. camera_at_pose: if not empty,
+// the iterations with Tukey weights use the model that it returns for the pose of those with Huber weights.
 PoseRefinement RefinePose(const CameraModel& camera, const Rigid3& start,
                           const PoseRefinementOptions& options, std::vector<PoseMeasurement>* measurements,
-                          PoseRefinementMemory* memory, const MotionPrior& prior);
+                          PoseRefinementMemory* memory, const MotionPrior& prior,
+                          const CameraAtPose& camera_at_pose = nullptr);
 
 }  // namespace docent::engine

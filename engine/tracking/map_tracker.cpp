@@ -256,7 +256,8 @@ std::optional<Rigid3> MapTracker::PoseFromPatches(const ImageFeatures& features,
 }
 
 MapTrackResult MapTracker::Track(const MapSnapshot& map, const ImageFeatures& features,
-                                 const Rigid3& predicted, Effort effort, Random* random) {
+                                 const Rigid3& predicted, Effort effort, Random* random,
+                                 const CameraAtPose& camera_at_pose) {
   MapTrackResult result;
   result.camera_from_map = predicted_ = predicted;
   matches_.clear();
@@ -269,11 +270,11 @@ MapTrackResult MapTracker::Track(const MapSnapshot& map, const ImageFeatures& fe
     // RANSAC needs finite points. Infinite points are searched from the prediction, which includes the
     // rotation of the whole image.
     if (!nearby_.infinite().empty() && panorama_ != kNoId && visible_finite_ < options_.min_coarse)
-      return Track(map, features, predicted, Effort::kWide, random);
+      return Track(map, features, predicted, Effort::kWide, random, camera_at_pose);
     const auto pose = PoseFromPatches(features, random);
     if (!pose) return result;
     ForgetLastFrame();
-    return Track(map, features, *pose, Effort::kStandard, random);
+    return Track(map, features, *pose, Effort::kStandard, random, camera_at_pose);
   }
   const bool wide = effort == Effort::kWide;
   Search(coarse_, features, wide ? options_.wide_radius_px : options_.coarse_radius_px, false);
@@ -292,23 +293,15 @@ MapTrackResult MapTracker::Track(const MapSnapshot& map, const ImageFeatures& fe
   result.attempted = static_cast<int>(attempts_.size());
   result.skipped_as_occluded = skipped_as_occluded_;
   result.found = static_cast<int>(measurements_.size());
-  Refine(predicted, options_.refinement, &result);
+  Refine(predicted, camera_at_pose, &result);
   return result;
 }
 
-void MapTracker::RefineAgain(const Rigid3& predicted, MapTrackResult* result) {
-  // Half of the iterations have Huber's weights. The pose is nearly right already, so that few are needed.
-  PoseRefinementOptions options = options_.refinement;
-  options.iterations = std::min(options.iterations, 4);
-  result->inliers = result->finite_inliers = 0;
-  Refine(predicted, options, result);
-}
-
-void MapTracker::Refine(const Rigid3& predicted, const PoseRefinementOptions& options,
-                        MapTrackResult* result) {
-  const PoseRefinement fine =
-      RefinePose(*camera_, result->camera_from_map, options, &measurements_, &memory_,
-                 {pivot_estimate_.pivot, predicted, pivot_estimate_.reliable, predicted_center_});
+void MapTracker::Refine(const Rigid3& predicted, const CameraAtPose& camera_at_pose, MapTrackResult* result) {
+  const std::shared_ptr<const CameraModel> camera = camera_;  // camera_at_pose may set another one
+  const PoseRefinement fine = RefinePose(
+      *camera, result->camera_from_map, options_.refinement, &measurements_, &memory_,
+      {pivot_estimate_.pivot, predicted, pivot_estimate_.reliable, predicted_center_}, camera_at_pose);
   result->camera_from_map = fine.camera_from_map;
   result->camera_from_map_without_prior = fine.camera_from_map_without_prior;
   result->used_center = fine.used_center;

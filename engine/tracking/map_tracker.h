@@ -90,12 +90,10 @@ class MapTracker {
     // by RANSAC.
     kRelocalization,
   };
-  // Estimates the pose. matches() returns the matches of the last call.
+  // Estimates the pose. matches() returns the matches of the last call. camera_at_pose: as in RefinePose, for
+  // the fine stage.
   MapTrackResult Track(const MapSnapshot& map, const ImageFeatures& features, const Rigid3& predicted,
-                       Effort effort, Random* random);
-  // Estimates the pose from the matches of the last call of Track again, for instance after SetCamera with a
-  // better model of the image. predicted: as in Track.
-  void RefineAgain(const Rigid3& predicted, MapTrackResult* result);
+                       Effort effort, Random* random, const CameraAtPose& camera_at_pose = nullptr);
   // One per match, with the weights of the last estimate.
   const std::vector<PoseMeasurement>& measurements() const { return measurements_; }
   // The rotation centre to assume where the translation cannot be observed.
@@ -149,7 +147,7 @@ class MapTracker {
   void SetSearchOrder();
   void AddCandidates(const Rigid3& camera_from_map, std::size_t wanted, Random* random);
   bool ShouldSearch(MapPointId point, Random* random) const;
-  void Refine(const Rigid3& predicted, const PoseRefinementOptions& options, MapTrackResult* result);
+  void Refine(const Rigid3& predicted, const CameraAtPose& camera_at_pose, MapTrackResult* result);
   void CountInliers(MapTrackResult* result);
   void Search(const std::vector<std::uint32_t>& which, const ImageFeatures& features, float radius,
               bool direct);

@@ -42,7 +42,6 @@ void PoseTracker::Begin(Timestamp time, const Rigid3& camera_from_map, ObservedM
   largest_rate_in_map_ = 0;
   motion_.Reset(time, camera_from_map);
   position_.Reset();
-  mean_twist_.reset();
   observed_ = observed;
 }
 
@@ -64,7 +63,6 @@ void PoseTracker::ContinueFrom(const PoseTracker& other) {
   frames_tolerant_ = other.frames_tolerant_;
   motion_ = other.motion_;
   position_ = other.position_;
-  mean_twist_ = other.mean_twist_;
   rotation_center_.Reset();
   pivot_estimate_ = other.pivot_estimate_;
   observed_ = other.observed_;
@@ -92,7 +90,6 @@ void PoseTracker::ApplyCorrections(const MapSnapshot& before, const MapSnapshot&
     if (moved == correction->after_from_before.end()) continue;
     motion_.ApplyCorrection(moved->second);
     position_.ApplyCorrection(moved->second);
-    mean_twist_.reset();
     rotation_reference_pose_ = CorrectedPose(rotation_reference_pose_, moved->second);
     median_depth_ *= moved->second.scale;
     pivot_estimate_.pivot *= moved->second.scale;
@@ -162,9 +159,23 @@ void PoseTracker::ExpectPosition(Timestamp time) {
   map_tracker_.SetPredictedCenter(position_.Predict(time, median_depth_));
 }
 
+MapTrackResult PoseTracker::TryFromPrediction(const MapSnapshot& map, const CameraImage& image,
+                                              const Rigid3& predicted, MapTracker::Effort effort,
+                                              Random* random) {
+  if (options_.readout.enabled) SetTwist(motion_.twist_per_second());
+  if (!HasReadoutMotion(image)) return TryFrom(map, image, predicted, effort, random);
+  return map_tracker_.Track(map, *image.features, predicted, effort, random,
+                            [&](const Rigid3& camera_from_map) {
+                              SetReadoutMotion(image, camera_from_map);
+                              return image_camera_;
+                            });
+}
+
 MapTrackResult PoseTracker::TrackFromPrediction(const MapSnapshot& map, const CameraImage& image,
                                                 const Rigid3& predicted, Random* random) {
-  const auto track = [&] { return TryFrom(map, image, predicted, MapTracker::Effort::kStandard, random); };
+  const auto track = [&] {
+    return TryFromPrediction(map, image, predicted, MapTracker::Effort::kStandard, random);
+  };
   if (comparison_ == PatchComparison::kStandard) {
     const MapTrackResult result = track();
     // The photometric difference may have returned.
@@ -222,25 +233,24 @@ void PoseTracker::SetTwist(const Eigen::Matrix<double, 6, 1>& twist) {
   map_tracker_.SetCamera(image_camera_);
 }
 
-void PoseTracker::AccountForReadout(const CameraImage& image, const Rigid3& predicted,
-                                    MapTrackResult* result) {
-  if (!options_.readout.enabled || image.is_repeated) return;
-  const double seconds = motion_.SecondsUntil(image.time);
-  if (!(seconds > 0)) return;
-  const auto mean_twist = [&] { return motion_.MeanTwist(image.time, result->camera_from_map); };
-  // The mean twist since the last frame is that of half a frame ago: it is extrapolated to the present.
-  Eigen::Matrix<double, 6, 1> twist = mean_twist();
-  if (mean_twist_) twist += 0.5 * (twist - *mean_twist_);
-  const Eigen::Vector3d rate_before = image_camera_->readout_motion().rotation_rate;
-  SetTwist(twist);
-  const ReadoutMotion& motion = image_camera_->readout_motion();
-  const double change_px = 0.5 * (motion.rotation_rate - rate_before).norm() *
-                           motion.readout_s.cwiseAbs().maxCoeff() / lens_->PixelAngle();
-  constexpr double kNegligible_px = 0.2;  // of the first and the last row
-  if (change_px > kNegligible_px) map_tracker_.RefineAgain(predicted, result);
-  mean_twist_ = mean_twist();
+bool PoseTracker::HasReadoutMotion(const CameraImage& image) const {
+  return options_.readout.enabled && !image.is_repeated && motion_.SecondsUntil(image.time) > 0;
+}
+
+void PoseTracker::SetReadoutMotion(const CameraImage& image, const Rigid3& camera_from_map) {
+  // The mean twist since the last image is that of half an interval ago. It is not extrapolated: where the
+  // points lie above or below the middle of the image, the pose depends on the twist, and the poses swung
+  // from image to image. In 1000 images of a Kinect with a readout time of 29 ms, the rotation between two of
+  // them was wrong by 4.7 milliradians in the median, and by 3.3 with the mean.
+  SetTwist(motion_.MeanTwist(image.time, camera_from_map));
+}
+
+void PoseTracker::EstimateReadout(const CameraImage& image, const MapTrackResult& result) {
+  if (!HasReadoutMotion(image)) return;
+  SetReadoutMotion(image, result.camera_from_map);
   if (!MayEstimateReadout()) return;
-  readout_.Add(*image_camera_, result->camera_from_map, map_tracker_.measurements(), result->sigma, seconds);
+  readout_.Add(*image_camera_, result.camera_from_map, map_tracker_.measurements(), result.sigma,
+               motion_.SecondsUntil(image.time));
   if (!readout_.readout_s().isZero(0)) readout_s_ = readout_.readout_s();
 }
 
@@ -253,10 +263,7 @@ PoseTracker::Estimate PoseTracker::Track(const MapSnapshot& map, const CameraIma
   if (image.is_repeated) predicted = motion_.last();
   if (observed_ == ObservedMotion::kPanorama)
     predicted = RotatedAbout(pivot_estimate_.pivot, motion_.last(), predicted.rotation);
-  if (options_.readout.enabled) {
-    UpdateReadout(map);
-    SetTwist(motion_.twist_per_second());
-  }
+  if (options_.readout.enabled) UpdateReadout(map);
   SearchPanoramaAt(predicted, map, policy);
   map_tracker_.SetPivot(pivot_estimate_);
   ExpectPosition(image.is_repeated ? motion_.time() : image.time);
@@ -270,7 +277,7 @@ PoseTracker::Estimate PoseTracker::Track(const MapSnapshot& map, const CameraIma
       if (observed_ == ObservedMotion::kPanorama)
         predicted = RotatedAbout(pivot_estimate_.pivot, motion_.last(), predicted.rotation);
     }
-    result = TryFrom(map, image, predicted, MapTracker::Effort::kWide, random);
+    result = TryFromPrediction(map, image, predicted, MapTracker::Effort::kWide, random);
   }
   if (!criteria_.IsAccepted(result, comparison_) && !criteria_.KeepsTrackWithFewPoints(result)) {
     map_tracker_.ForgetLastFrame();
@@ -280,7 +287,7 @@ PoseTracker::Estimate PoseTracker::Track(const MapSnapshot& map, const CameraIma
     return rotation_only ? Estimate{Outcome::kRotationOnly, *rotation_only}
                          : Estimate{Outcome::kLost, result};
   }
-  AccountForReadout(image, predicted, &result);
+  EstimateReadout(image, result);
   map_tracker_.SetPredictedCenter(std::nullopt);
   poor_rotation_frames_ = criteria_.FitsRotation(result, map) ? 0 : poor_rotation_frames_ + 1;
   const bool left = poor_rotation_frames_ >= options_.max_poor_rotation_frames;
@@ -362,7 +369,6 @@ void PoseTracker::Accept(const CameraImage& image, const MapTrackResult& result,
   const Timestamp previous_time = motion_.time();
   if (relocalized) {
     frames_tolerant_ = 0;
-    mean_twist_.reset();
     drift_per_s_.setZero();
     motion_.Reset(image.time, result.camera_from_map);
     rotation_center_.Reset();
@@ -391,7 +397,6 @@ void PoseTracker::Accept(const CameraImage& image, const MapTrackResult& result,
 
 void PoseTracker::Lose(Timestamp time) {
   SetCamera(lens_);
-  mean_twist_.reset();
   map_tracker_.ForgetLastFrame();
   poor_rotation_frames_ = 0;
   position_.Reset();

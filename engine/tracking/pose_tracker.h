@@ -109,8 +109,15 @@ class PoseTracker {
   // Whether the readout time may be estimated from the residuals of the present image: no map has it yet,
   // nor a calibration, and the images of the map were not taken while turning as fast.
   bool MayEstimateReadout() const;
-  // Repeats the pose estimate with the motion that it implies, and estimates the readout time from it.
-  void AccountForReadout(const CameraImage& image, const Rigid3& predicted, MapTrackResult* result);
+  // Whether the motion during an image is to be taken from its pose.
+  bool HasReadoutMotion(const CameraImage& image) const;
+  // Gives an image with this pose the motion that the pose implies.
+  void SetReadoutMotion(const CameraImage& image, const Rigid3& camera_from_map);
+  // Tracks the map from the predicted pose, with the motion during the image that the new pose implies.
+  MapTrackResult TryFromPrediction(const MapSnapshot& map, const CameraImage& image, const Rigid3& predicted,
+                                   MapTracker::Effort effort, Random* random);
+  // Estimates the readout time from the residuals of an accepted pose, unless it is known.
+  void EstimateReadout(const CameraImage& image, const MapTrackResult& result);
   // The panorama map to search: the open one, or one to whose centre the camera has returned if the finite
   // points do not cover the image.
   PanoramaId PanoramaFor(const Rigid3& predicted, const MapSnapshot& map, const KeyFramePolicy& policy) const;
@@ -156,8 +163,6 @@ class PoseTracker {
   const MapSnapshot* readout_map_ = nullptr;  // the snapshot that was read last, never dereferenced
   std::uint64_t readout_revision_ = 0;
   ReadoutEstimator readout_;
-  // Left twist per second between the last two frames, as long as the track goes on.
-  std::optional<Eigen::Matrix<double, 6, 1>> mean_twist_;
   Timestamp last_points_{};  // time of the last pose from map points
   // Smoothed velocity that no rotation about the pivot explains, camera frame, in median depths per second.
   Eigen::Vector3d drift_per_s_ = Eigen::Vector3d::Zero();

@@ -468,5 +468,33 @@ TEST(PoseRefinement, IgnoresThePredictedCenterWherePointsDetermineThePosition) {
   EXPECT_TRUE(IsNear(with.camera_from_map, without.camera_from_map, 1e-12, 1e-12));
 }
 
+TEST(PoseRefinement, UsesTheMotionThatThePoseImplies) {
+  // The camera stood still before, and turned until the middle of this image.
+  const Rotation3 turn = Rotation3::Exp(Eigen::Vector3d(0.01, -0.04, 0.02));
+  const Rigid3 before = Rigid3(turn.inverse(), Eigen::Vector3d::Zero()) * TruePose();
+  constexpr double kInterval_s = 0.033;
+  const Eigen::Vector2d readout_s(0, 0.03);
+  const auto lens = std::make_shared<const CameraModel>(kLens);
+  const auto camera_at = [&](const Rigid3& pose) {
+    const Eigen::Vector3d rate = (pose.rotation * before.rotation.inverse()).Log() / kInterval_s;
+    return std::make_shared<const CameraModel>(CameraModel::WithReadout(lens, {rate, readout_s}));
+  };
+  Random random(43);
+  std::vector<PoseMeasurement> measurements;
+  AddMeasurements(300, 0, false, &random, &measurements);
+  const auto image = camera_at(TruePose());
+  for (PoseMeasurement& measurement : measurements)
+    measurement.pixel = *image->Project((TruePose() * measurement.point_in_map).head<3>()) +
+                        0.3 / measurement.inverse_sigma * RandomNormals(&random);
+  const auto error = [&](const CameraAtPose& camera_at_pose) {
+    PoseRefinementMemory memory;
+    return PoseError(RefinePose(kLens, before, {}, &measurements, &memory, {Eigen::Vector3d::Zero(), before},
+                                camera_at_pose))
+        .norm();
+  };
+  EXPECT_LT(error(camera_at), 0.2 * error(nullptr));
+  EXPECT_LT(error(camera_at), 2 * error([&](const Rigid3&) { return image; }));
+}
+
 }  // namespace
 }  // namespace docent::engine

@@ -194,6 +194,52 @@ TEST_F(RollingShutterInKnownRoom, AnEstimateEndsWhenTheMapperFindsNoneInFasterIm
   EXPECT_EQ(tracker_.readout_s(), Eigen::Vector2d::Zero());
 }
 
+// A camera whose last row is exposed 30 ms after the first, and which sees the known room in the upper half
+// of the image only: its points were exposed 10 ms before the moment of the pose.
+class RollingShutterOverAWall : public KnownRoom {
+ public:
+  static constexpr double kReadout_s = 0.03;
+
+  static Rigid3 SwayingPose(int frame) {
+    return CameraAt({0.005 * frame, 0, 0}, {2 * std::sin(0.2 * frame), 3 * std::sin(0.15 * frame), 0});
+  }
+  static std::shared_ptr<const CameraModel> Lens() {
+    static const auto lens = std::make_shared<const CameraModel>(Camera()->WithKnownReadout({0, kReadout_s}));
+    return lens;
+  }
+  static cv::Mat UpperThird(int frame) {
+    const double interval_s = ToSeconds(ImageAt(Pose(1), 1).time - ImageAt(Pose(0), 0).time);
+    const Rotation3 turn = SwayingPose(frame + 1).rotation * SwayingPose(frame - 1).rotation.inverse();
+    const CameraModel image =
+        CameraModel::WithReadout(Lens(), {turn.Log() / (2 * interval_s), {0, kReadout_s}});
+    cv::Mat pixels = World().Render(image, SwayingPose(frame), 1.5, frame);
+    pixels.rowRange(pixels.rows / 3, pixels.rows).setTo(128);
+    return pixels;
+  }
+};
+
+TEST_F(RollingShutterOverAWall, ThePosesDoNotSwingFromImageToImage) {
+  constexpr int kFrames = 60;
+  PoseTracker tracker({}, Lens());
+  tracker.Begin(ImageAt(SwayingPose(0)).time, SwayingPose(0), ObservedMotion::kSixDof);
+  double sum = 0;
+  for (int i = 1; i <= kFrames; ++i) {
+    const Frame frame = testing_world::MakeFrame(i, UpperThird(i));
+    CameraImage image;
+    image.time = frame.time;
+    image.camera = Lens();
+    image.features = MakeFeatures(frame.image);
+    const auto estimate = tracker.Track(*TheMap(), image, std::nullopt, policy_, &random_);
+    ASSERT_EQ(estimate.outcome, Outcome::kPose) << i;
+    const Rotation3 before = tracker.last().rotation;
+    tracker.Accept(image, estimate.result, false);
+    const Rotation3 error = tracker.last().rotation * before.inverse() * SwayingPose(i - 1).rotation *
+                            SwayingPose(i).rotation.inverse();
+    sum += error.Log().squaredNorm();
+  }
+  EXPECT_LT(std::sqrt(sum / kFrames) / Camera()->PixelAngle(), 0.25) << "pixels";
+}
+
 TEST_F(KnownRoom, AlternatesThePatchComparison) {
   EXPECT_EQ(tracker_.comparison(), PatchComparison::kStandard);
   tracker_.AlternateComparison();
