@@ -8,6 +8,7 @@
 
 #include "engine/geometry/lens_distortion.h"
 #include "engine/geometry/plain_vector3.h"
+#include "engine/geometry/projection_batch.h"
 
 namespace docent::engine {
 namespace {
@@ -269,6 +270,72 @@ bool CameraModel::ProjectAtExposureOf(const Eigen::Vector2d& measured, const Eig
                      y = lens.y_by_point + Cross(lens.y_by_point, angle);
   *jacobian << x.x, x.y, x.z, y.x, y.y, y.z;
   return true;
+}
+
+// The operations, and their order, are those of ProjectAtExposureOf for one point. No branch depends on a
+// point.
+template <bool rotates>
+void CameraModel::ProjectThroughBrownLens(ProjectionBatch* batch) const {
+  const std::array<double, 5> distortion = distortion_;
+  const Intrinsics in = intrinsics_;
+  const ReadoutMotion readout = readout_;
+  const PlainVector3 rate(readout.rotation_rate);
+  const double max_radius_squared = max_radius_squared_;
+  for (std::size_t i = 0; i < ProjectionBatch::kSize; ++i) {
+    PlainVector3 point(batch->x[i], batch->y[i], batch->z[i]), angle;
+    if constexpr (rotates) {
+      angle = rate * (readout.readout_s.x() * ((batch->measured_x[i] + 0.5) / in.width_px - 0.5) +
+                      readout.readout_s.y() * ((batch->measured_y[i] + 0.5) / in.height_px - 0.5));
+      point = SmallRotation(angle, point);
+    }
+    const double radius_squared = point.x * point.x + point.y * point.y;
+    batch->valid[i] = (point.z > 0) & (radius_squared <= max_radius_squared * point.z * point.z) ? 1.0 : 0.0;
+    const double inverse_z = 1 / point.z;
+    const double x = point.x * inverse_z, y = point.y * inverse_z;
+    ImagePoint at;
+    BrownDistort(distortion, x, y, &at);
+    at.xx *= inverse_z;
+    at.xy *= inverse_z;
+    at.yy *= inverse_z;
+    at.xz = -(at.xx * x + at.xy * y);
+    at.yz = -(at.xy * x + at.yy * y);
+    batch->pixel_x[i] = in.fx * at.x + in.cx;
+    batch->pixel_y[i] = in.fy * at.y + in.cy;
+    PlainVector3 x_by_point(in.fx * at.xx, in.fx * at.xy, in.fx * at.xz);
+    PlainVector3 y_by_point(in.fy * at.xy, in.fy * at.yy, in.fy * at.yz);
+    if constexpr (rotates) {
+      x_by_point = x_by_point + Cross(x_by_point, angle);
+      y_by_point = y_by_point + Cross(y_by_point, angle);
+    }
+    batch->xx[i] = x_by_point.x;
+    batch->xy[i] = x_by_point.y;
+    batch->xz[i] = x_by_point.z;
+    batch->yx[i] = y_by_point.x;
+    batch->yy[i] = y_by_point.y;
+    batch->yz[i] = y_by_point.z;
+  }
+}
+
+void CameraModel::ProjectAtExposureOf(ProjectionBatch* batch) const {
+  if (lens_ == LensModel::kRadialTangential) {
+    rotates_ ? ProjectThroughBrownLens<true>(batch) : ProjectThroughBrownLens<false>(batch);
+    return;
+  }
+  for (std::size_t i = 0; i < ProjectionBatch::kSize; ++i) {
+    Eigen::Vector2d pixel = Eigen::Vector2d::Zero();
+    Eigen::Matrix<double, 2, 3> jacobian = Eigen::Matrix<double, 2, 3>::Zero();
+    const bool valid = ProjectAtExposureOf({batch->measured_x[i], batch->measured_y[i]},
+                                           {batch->x[i], batch->y[i], batch->z[i]}, &pixel, &jacobian);
+    batch->valid[i] = valid ? 1 : 0;
+    batch->pixel_x[i] = pixel.x();
+    batch->pixel_y[i] = pixel.y();
+    batch->xx[i] = jacobian(0, 0);
+    batch->xy[i] = jacobian(0, 1);
+    batch->xz[i] = jacobian(0, 2);
+    batch->yx[i] = jacobian(1, 0);
+    batch->yy[i] = jacobian(1, 1);
+    batch->yz[i] = jacobian(1, 2);
+  }
 }
 
 bool CameraModel::Project(const Eigen::Vector3d& point_in_camera, Eigen::Vector2d* pixel,

@@ -11,6 +11,7 @@
 namespace docent::engine {
 
 struct PlainVector3;
+struct ProjectionBatch;
 
 // How a lens distorts, with the meaning of CameraModel::distortion.
 enum class LensModel {
@@ -81,6 +82,8 @@ class CameraModel {
   // Project for an image of a rolling shutter, and equal to it where the point is.
   bool ProjectAtExposureOf(const Eigen::Vector2d& measured, const Eigen::Vector3d& point_in_camera,
                            Eigen::Vector2d* pixel, Eigen::Matrix<double, 2, 3>* jacobian) const;
+  // The same, to the bit, for many points at once; with the Brown model in vector registers.
+  void ProjectAtExposureOf(ProjectionBatch* batch) const;
   // Unit-length ray of a pixel in the camera frame, in closed form or by a checked Newton iteration. Empty if
   // no ray of the one-to-one range projects to the pixel.
   std::optional<Eigen::Vector3d> Unproject(const Eigen::Vector2d& pixel) const;
@@ -138,6 +141,8 @@ class CameraModel {
   bool ProjectThroughLens(const PlainVector3& point, bool with_jacobian, LensProjection* result) const;
   bool ProjectThroughPlane(const PlainVector3& point, bool with_jacobian, ImagePoint* result) const;
   bool ProjectByAngle(const PlainVector3& point, ImagePoint* result) const;
+  template <bool rotates>
+  void ProjectThroughBrownLens(ProjectionBatch* batch) const;
   // Time from the middle of the image to the exposure of a pixel, seconds.
   double ExposureDelay(double x, double y) const;
 

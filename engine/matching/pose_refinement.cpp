@@ -6,9 +6,11 @@
 #include <array>
 #include <cmath>
 #include <limits>
+#include <span>
 
 #include "engine/base/multiply_add.h"
 #include "engine/base/option_check.h"
+#include "engine/geometry/projection_batch.h"
 #include "engine/vision/lanes.h"
 
 namespace docent::engine {
@@ -20,19 +22,33 @@ using Vector6 = Eigen::Matrix<double, 6, 1>;
 
 using Projection = PoseRefinementMemory::Projection;
 
-// rotation, translation: of camera_from_map; multiplying by a matrix takes half the time of a quaternion.
-Projection ProjectMeasurement(const CameraModel& camera, const Eigen::Matrix3d& rotation,
-                              const Eigen::Vector3d& translation, const PoseMeasurement& measurement) {
-  Projection projection;
-  projection.point_in_camera =
-      rotation * measurement.point_in_map.head<3>() + measurement.point_in_map[3] * translation;
-  Eigen::Vector2d pixel;
-  projection.valid =
-      camera.ProjectAtExposureOf(measurement.pixel, projection.point_in_camera, &pixel, &projection.jacobian);
-  if (!projection.valid) return projection;
-  projection.error = (measurement.pixel - pixel) * measurement.inverse_sigma;
-  projection.jacobian *= measurement.inverse_sigma;
-  return projection;
+// Projects as many measurements as fit into a batch. rotation, translation: of camera_from_map; multiplying
+// by a matrix takes half the time of a quaternion.
+void ProjectMeasurements(const CameraModel& camera, const Eigen::Matrix3d& rotation,
+                         const Eigen::Vector3d& translation, std::span<const PoseMeasurement> measurements,
+                         std::span<Projection> projections) {
+  ProjectionBatch batch;
+  for (std::size_t i = 0; i < ProjectionBatch::kSize; ++i) {
+    const PoseMeasurement& measurement = measurements[std::min(i, measurements.size() - 1)];
+    const Eigen::Vector3d point =
+        rotation * measurement.point_in_map.head<3>() + measurement.point_in_map[3] * translation;
+    batch.measured_x[i] = measurement.pixel.x();
+    batch.measured_y[i] = measurement.pixel.y();
+    batch.x[i] = point.x();
+    batch.y[i] = point.y();
+    batch.z[i] = point.z();
+  }
+  camera.ProjectAtExposureOf(&batch);
+  for (std::size_t i = 0; i < measurements.size(); ++i) {
+    const double scale = measurements[i].inverse_sigma;
+    Projection& projection = projections[i];
+    projection.point_in_camera = {batch.x[i], batch.y[i], batch.z[i]};
+    projection.valid = batch.valid[i] != 0;
+    projection.error = {(batch.measured_x[i] - batch.pixel_x[i]) * scale,
+                        (batch.measured_y[i] - batch.pixel_y[i]) * scale};
+    projection.jacobian << batch.xx[i] * scale, batch.xy[i] * scale, batch.xz[i] * scale, batch.yx[i] * scale,
+        batch.yy[i] * scale, batch.yz[i] * scale;
+  }
 }
 
 // Sums the normal equations of a pose. Columns of eight rows, of which the last two stay zero, fill vector
@@ -217,10 +233,14 @@ PoseRefinement PoseDescent::From(const Rigid3& start) {
 
 void PoseDescent::Project(bool tukey) {
   const Eigen::Matrix3d rotation = result_.camera_from_map.rotation.matrix();
-  memory_.projections.clear();
-  for (const PoseMeasurement& measurement : measurements_)
-    memory_.projections.push_back(
-        ProjectMeasurement(*camera_, rotation, result_.camera_from_map.translation, measurement));
+  const std::span<const PoseMeasurement> measurements(measurements_);
+  memory_.projections.resize(measurements.size());
+  for (std::size_t first = 0; first < measurements.size(); first += ProjectionBatch::kSize) {
+    const std::size_t count = std::min(ProjectionBatch::kSize, measurements.size() - first);
+    ProjectMeasurements(*camera_, rotation, result_.camera_from_map.translation,
+                        measurements.subspan(first, count),
+                        std::span(memory_.projections).subspan(first, count));
+  }
   for (const bool infinite : {false, true})
     scales_[infinite] = EstimateScale(measurements_, infinite, options_, tukey, &memory_);
 }

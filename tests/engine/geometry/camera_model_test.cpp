@@ -9,11 +9,14 @@
 #include <fstream>
 #include <limits>
 #include <map>
+#include <memory>
 #include <opencv2/calib3d.hpp>
 #include <sstream>
 #include <string>
 #include <vector>
 
+#include "engine/base/random.h"
+#include "engine/geometry/projection_batch.h"
 #include "tests/engine/geometry/transform_laws.h"
 
 namespace docent::engine {
@@ -123,6 +126,40 @@ TEST(CameraModelTest, JacobianEqualsTheNumericDerivative) {
       }
     }
   }
+}
+
+TEST(CameraModelTest, ProjectsABatchAsEachOfItsPointsToTheBit) {
+  Random random(5);
+  int invalid = 0;
+  for (const LensCase& lens : Lenses()) {
+    const auto camera = std::make_shared<const CameraModel>(MakeCamera(lens));
+    for (const ReadoutMotion& motion : {ReadoutMotion{}, ReadoutMotion{{0.7, -1.5, 0.4}, {0, 0.03}}}) {
+      const CameraModel image = CameraModel::WithReadout(camera, motion);
+      ProjectionBatch batch;
+      for (std::size_t i = 0; i < ProjectionBatch::kSize; ++i) {
+        batch.measured_x[i] = random.Uniform(0, 751);
+        batch.measured_y[i] = random.Uniform(0, 479);
+        batch.x[i] = random.Uniform(-2, 2);
+        batch.y[i] = random.Uniform(-2, 2);
+        batch.z[i] = i == 0 ? 0 : random.Uniform(-0.3, 3);
+      }
+      image.ProjectAtExposureOf(&batch);
+      for (std::size_t i = 0; i < ProjectionBatch::kSize; ++i) {
+        Eigen::Vector2d pixel;
+        Eigen::Matrix<double, 2, 3> jacobian;
+        const bool valid = image.ProjectAtExposureOf({batch.measured_x[i], batch.measured_y[i]},
+                                                     {batch.x[i], batch.y[i], batch.z[i]}, &pixel, &jacobian);
+        EXPECT_EQ(batch.valid[i], valid ? 1 : 0) << lens.name;
+        invalid += valid ? 0 : 1;
+        if (!valid) continue;
+        EXPECT_EQ(Eigen::Vector2d(batch.pixel_x[i], batch.pixel_y[i]), pixel) << lens.name;
+        Eigen::Matrix<double, 2, 3> in_batch;
+        in_batch << batch.xx[i], batch.xy[i], batch.xz[i], batch.yx[i], batch.yy[i], batch.yz[i];
+        EXPECT_EQ(in_batch, jacobian) << lens.name;
+      }
+    }
+  }
+  EXPECT_GT(invalid, 20) << "points behind the camera are among them";
 }
 
 TEST(CameraModelTest, MatchesTheOpenCvPinholeModel) {
