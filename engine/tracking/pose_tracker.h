@@ -116,7 +116,8 @@ class PoseTracker {
   // Tracks the map from the predicted pose, with the motion during the image that the new pose implies.
   MapTrackResult TryFromPrediction(const MapSnapshot& map, const CameraImage& image, const Rigid3& predicted,
                                    MapTracker::Effort effort, Random* random);
-  // Estimates the readout time from the residuals of an accepted pose, unless it is known.
+  // Gives an image the motion of its accepted pose, and estimates the readout time from the residuals, unless
+  // it is known.
   void EstimateReadout(const CameraImage& image, const MapTrackResult& result);
   // The panorama map to search: the open one, or one to whose centre the camera has returned if the finite
   // points do not cover the image.
